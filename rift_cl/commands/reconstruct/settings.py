@@ -39,7 +39,7 @@ _STEPS = {"sirt": 100, "cgls": 30, "tv": 200, "levels": 1200}
 # Preconditioned CGLS is near its best after the first few iterations.
 _PRECONDITIONED_CGLS = 4
 # A larger tilt is no misalignment, in degrees.
-_MOST_TILT = 5.0
+MOST_TILT = 5.0
 # Least passes over all subsets.
 _FEWEST_PASSES = 5
 # What may differ between a run and the one that resumes it: it changes no bit of the result.
@@ -247,8 +247,8 @@ class ReconstructSettings(
 
             checked_coefficients(self.hardening)
         self._check_samples()
-        if self.tilt is not None and not abs(self.tilt) <= _MOST_TILT:
-            raise InputError(f"--tilt is {self.tilt:g} degrees, wanted {_MOST_TILT:g} at most")
+        if self.tilt is not None and not abs(self.tilt) <= MOST_TILT:
+            raise InputError(f"--tilt is {self.tilt:g} degrees, wanted {MOST_TILT:g} at most")
         if self.centers is not None and (self.center is not None or self.tilt is not None):
             raise InputError("--centers replaces --center and --tilt: leave those out")
         if self.subsets not in (None, 1) and self.precondition is not None:

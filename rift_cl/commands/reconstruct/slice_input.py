@@ -31,7 +31,7 @@ from rift_cl.commands.inputs.scan_rows import (
 )
 from rift_cl.commands.reconstruct.binned_file import binned_file, row_binning
 from rift_cl.commands.reconstruct.clean_rows import Alignment, CleanRows, LoadedRows
-from rift_cl.commands.reconstruct.settings import ReconstructSettings
+from rift_cl.commands.reconstruct.settings import MOST_TILT, ReconstructSettings
 from rift_cl.errors import InputError
 from rift_cl.geometry import Fan, Parallel, at_axis
 from rift_cl.geometry.length_units import length_unit
@@ -407,10 +407,11 @@ def unsure_tilt(estimate: AxisEstimate, rows: int) -> list[str]:
     if estimate.tilt_is_sure or not told:
         return []
     tilt, error = (math.degrees(math.atan(slope)) for slope in (estimate.tilt, estimate.tilt_error))
+    does_so = f" (--tilt {tilt:.2g} does so)" if abs(tilt) <= MOST_TILT else ""
     return [
         f"The rows' axes lie about a line that tilts by {tilt:.2g} +- {error:.2g} degrees, from "
         f"which they scatter {estimate.scatter:.2g} times as much as their errors explain: "
-        f"projections were not turned by it (--tilt {tilt:.2g} does so)."
+        f"projections were not turned by it{does_so}."
     ]
 
 
