@@ -43,15 +43,14 @@ from rift_cl.splat.renderer import Renderer
 
 Settings = Mapping[str, Any]
 Floats = NDArray[np.float64]
-_FAINT = {"strategy.opacity_penalty": 0.0}
 VARIANTS: dict[str, Settings] = {
+    "mcmc": {"strategy": "mcmc"},
     "defaults": {},
+    "opacities penalised": {"strategy.opacity_penalty": 0.01},
     "flatness": {"surface.flatness": 0.1},
     "opacity entropy": {"surface.opacity_entropy": 0.01},
     "normal consistency": {"surface.normal_consistency": 0.03},
-    "no opacity penalty": _FAINT,
-    "no opacity penalty, opacity entropy": {**_FAINT, "surface.opacity_entropy": 0.01},
-    "no opacity penalty, normal consistency": {**_FAINT, "surface.normal_consistency": 0.1},
+    "more normal consistency": {"surface.normal_consistency": 0.1},
     "preset surface": PRESETS["surface"],
 }
 # Cameras that look at the ball, its part that faces them (cosine), and what counts as solid.

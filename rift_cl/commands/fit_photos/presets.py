@@ -13,10 +13,8 @@ from typing import Any
 PRESETS: Mapping[str, Mapping[str, Any]] = {
     # Eight spherical Gaussians each: higher scores in a longer time, for viewers that know them.
     "lobes": {"angular": "sg", "modes": 8},
-    # Surfaces nearer to where they are, at some loss of the photographs: without the penalty that
-    # keeps splats faint, and with priors on their shapes.
+    # Surfaces nearer to where they are, at some loss of the photographs: priors on splats' shapes.
     "surface": {
-        "strategy.opacity_penalty": 0.0,
         "surface.flatness": 0.03,
         "surface.normal_consistency": 0.01,
     },
