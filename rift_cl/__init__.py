@@ -77,6 +77,7 @@ if TYPE_CHECKING:
         cgls,
         fbp,
         find_center,
+        operator_norm,
         sirt,
         tv,
     )
@@ -139,6 +140,7 @@ __all__ = [
     "open_device",
     "open_lens",
     "open_scan",
+    "operator_norm",
     "phantom",
     "plan",
     "plan_views",
@@ -211,6 +213,7 @@ __getattr__, __dir__ = lazy_names(
             "cgls",
             "fbp",
             "find_center",
+            "operator_norm",
             "sirt",
             "tv",
         ),

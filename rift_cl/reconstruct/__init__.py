@@ -23,6 +23,7 @@ from rift_cl.reconstruct.solvers.disc_prior import Disc, find_disc, material_len
 from rift_cl.reconstruct.solvers.few_levels import FewLevels
 from rift_cl.reconstruct.solvers.fista import Fista
 from rift_cl.reconstruct.solvers.measured_rays import MeasuredRays
+from rift_cl.reconstruct.solvers.operator_norm import operator_norm
 from rift_cl.reconstruct.solvers.ordered_subsets import OrderedSubsets
 from rift_cl.reconstruct.solvers.pdhg import Pdhg
 from rift_cl.reconstruct.solvers.poisson_weights import RayWeights, poisson_weights
@@ -57,6 +58,7 @@ __all__ = [
     "find_disc",
     "material_lengths",
     "mean_diagonal",
+    "operator_norm",
     "poisson_weights",
     "rebin_fan",
     "remove_rings",
