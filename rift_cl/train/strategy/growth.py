@@ -18,6 +18,8 @@ from rift_cl.train.strategy.protocol import Penalties, Strategy, StrategySetting
 # A set of splats grows by no more than this share at once.
 _MOST_GROWTH = 1.0
 
+Raw = dict[str, NDArray[np.float32]]
+
 
 @dataclass(frozen=True)
 class GrowthSettings(StrategySettings):
@@ -104,8 +106,33 @@ def grown(count: int, growth: float, most: int) -> int:
     return max(0, min(round(count * growth), most - count))
 
 
-def extended(array: NDArray[np.float32], more: int) -> NDArray[np.float32]:
-    """An array of all splats with rows of zeros for so many more."""
+def take_over(
+    raw: Raw,
+    moments: tuple[Raw, Raw],
+    *,
+    hosts: NDArray[np.intp],
+    places: NDArray[np.intp],
+    added: int,
+) -> None:
+    """Make splats what others are, and begin anew with Adam's moments of both.
+
+    Args:
+        raw: all parameters by name, which are changed.
+        moments: Adam's two moments of them, likewise.
+        hosts: the others, one for each place.
+        places: which splats become as they are.
+        added: how many places lie behind the splats that there are.
+    """
+    touched = np.concatenate([places, hosts])
+    for name, values in raw.items():
+        raw[name] = _extended(values, added)
+        raw[name][places] = raw[name][hosts]
+        for moment in moments:
+            moment[name] = _extended(moment[name], added)
+            moment[name][touched] = 0
+
+
+def _extended(array: NDArray[np.float32], more: int) -> NDArray[np.float32]:
     return np.concatenate([array, np.zeros((more, *array.shape[1:]), np.float32)])
 
 

@@ -28,9 +28,9 @@ from rift_cl.train.ranges import check_number
 from rift_cl.train.strategy.growth import (
     GrowthSettings,
     GrowthStrategy,
-    extended,
     grown,
     sigmoid,
+    take_over,
 )
 from rift_cl.train.strategy.protocol import TrainingRun
 
@@ -142,13 +142,7 @@ def relocate(
     shared = np.bincount(chosen, minlength=len(parameters))
     _share(raw, opacities, shared, depths=parameters.amplitude)
     places = np.concatenate([faded, np.arange(len(parameters), len(parameters) + added)])
-    touched = np.concatenate([places, np.flatnonzero(shared)])
-    for name in parameters.groups:
-        raw[name] = extended(raw[name], added)
-        raw[name][places] = raw[name][chosen]
-        for moments in (first, second):
-            moments[name] = extended(moments[name], added)
-            moments[name][touched] = 0
+    take_over(raw, (first, second), hosts=chosen, places=places, added=added)
     return parameters.replaced(raw, first, second)
 
 

@@ -32,9 +32,10 @@ from rift_cl.train.ranges import check_number, check_whole
 from rift_cl.train.strategy.growth import (
     GrowthSettings,
     GrowthStrategy,
-    extended,
+    Raw,
     grown,
     sigmoid,
+    take_over,
 )
 from rift_cl.train.strategy.protocol import TrainingRun, check_names
 
@@ -48,8 +49,6 @@ if TYPE_CHECKING:
 _APART, _SHRINK = 0.5, 0.6
 # Sum of the residual shown, of the pixels made up, and number of views.
 _COLUMNS = 3
-
-Raw = dict[str, NDArray[np.float32]]
 
 
 @dataclass(frozen=True)
@@ -289,12 +288,7 @@ def relocate_by_residual(
     if places.size == 0:
         return parameters
     hosts = random.choice(len(parameters), places.size, replace=False, p=chance / chance.sum())
-    for name in parameters.groups:
-        raw[name] = extended(raw[name], added)
-        raw[name][places] = raw[name][hosts]
-        for moments in (first, second):
-            moments[name] = extended(moments[name], added)
-            moments[name][places] = moments[name][hosts] = 0
+    take_over(raw, (first, second), hosts=hosts, places=places, added=added)
     _set_apart(raw, hosts, places)
     return parameters.replaced(raw, first, second)
 
