@@ -282,7 +282,7 @@ def _check_whole(device: Device, array: DeviceArray, *, name: str, inside: bool 
     if not array.flags.c_contiguous:
         raise ShapeError(f"{name} is a strided view on the device: {remedy}")
     if array.offset and not inside:
-        raise ShapeError(f"{name} begins inside the buffer of another device array: {remedy}")
+        raise ShapeError(f"{name} is a view that begins inside another device array: {remedy}")
     if array.context != device.context:
         raise DeviceError(f"{name} lives on another device than {device.name}: copy it over first")
 

@@ -242,7 +242,7 @@ def test_unusable_arrays_are_named(device, name, depth, channels):
     rows, *others = shape = shapes[name]
     for array, error, words in [
         (device.zeros((rows, 2)), ShapeError, r"has shape \(\d+, 2\), wanted"),
-        (device.zeros((rows + 1, *others))[1:], ShapeError, "begins inside"),
+        (device.zeros((rows + 1, *others))[1:], ShapeError, "is a view that begins inside"),
         (device.zeros(shape, np.float64), DTypeError, "has type float64"),
         (np.zeros(shape, np.float32), DTypeError, "is a ndarray on the host"),
         (elsewhere.zeros(shape), DeviceError, "lives on another device"),
