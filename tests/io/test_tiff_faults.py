@@ -145,7 +145,7 @@ def test_a_dataset_has_no_meaning(series: Path) -> None:
         ("a.txt", "0\n1\nnan\n3\n4\n5", NonFiniteError, "angle 2"),
         ("a.txt", "0\n1\n1e999\n3\n4\n5", NonFiniteError, "angle 2"),
         ("a.txt", "angle\n0\n1\n2\n3\n4\n5", FileFormatError, "line 1 holds 'angle'"),
-        ("a.csv", "0, 1\n1, 2\n", FileFormatError, "line 1 holds 2 numbers"),
+        ("a.csv", "0, 1\n1, 2\n", FileFormatError, r"line 1 \('0 1'\) holds 2 columns"),
         ("a.txt", b"\xff\xfe\x00", FileFormatError, "cannot be read"),
         ("a.npy", b"no array", FileFormatError, "cannot be read"),
         ("a.npy", np.zeros((2, 3)), ShapeError, "wanted angles along one axis"),

@@ -25,6 +25,7 @@ _ITEMS = (8, 4, 3)
 _MORE = {
     "fft_unpack": ("MASKED=1",),
     "loss_grad": ("WEIGHTED=1",),
+    "residual_image": ("WEIGHTED=1",),
     "splat_activate": ("BAND=1",),
     "splat_project_grad": ("ABSGRAD=1", "DEFOCUS=1"),
     "ssim_map": ("WEIGHTED=1",),
