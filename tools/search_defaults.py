@@ -33,6 +33,7 @@ from rift_cl.commands.fit_photos.presets import PRESETS
 from rift_cl.commands.fit_photos.settings import FitPhotosSettings
 from rift_cl.commands.run_folder.saved_settings import options_of
 from rift_cl.io import write_text
+from rift_cl.train import LearningRates
 
 Settings = Mapping[str, Any]
 # What all gains are over.
@@ -47,10 +48,30 @@ _SCALES = "strategy.scale_penalty"
 _MCMC = {"strategy": "mcmc"}
 
 
+@dataclass(frozen=True)
+class Times:
+    """A learning rate of positions, as a multiple of that of a fit of so many steps by default."""
+
+    factor: float
+
+
 def times(factor: float, *names: str, of: Settings | None = None) -> Settings:
     """Settings in which some values are larger by a factor than in others, or by default."""
     begun = {} if of is None else dict(of)
-    return {**begun, **{name: factor * begun.get(name, _USUAL[name]) for name in names}}
+    usual = {name: begun.get(name, _USUAL[name]) for name in names}
+    larger = {
+        name: Times(factor) if value is None else factor * value for name, value in usual.items()
+    }
+    return {**begun, **larger}
+
+
+def in_numbers(variant: Settings, steps: int) -> Settings:
+    """The settings of a variant for fits of so many steps."""
+    means = LearningRates().decided(steps).means or 0.0
+    return {
+        name: value.factor * means if isinstance(value, Times) else value
+        for name, value in variant.items()
+    }
 
 
 _MOVES = (_MEANS, *_SHAPES)
@@ -80,9 +101,9 @@ VARIANTS: dict[str, Settings] = {
     "scales penalised / 2": times(0.5, _SCALES),
     "opacities penalised": {"strategy.opacity_penalty": 0.01},
     "cooldown 0.25": {"cooldown": 0.25},
-    "relocation every 100": {"strategy.first": 200, "strategy.every": 100},
+    "relocations / 2": {"strategy.first": 200, "strategy.every": 100, "strategy.relocations": 25},
     "contribution / 2": times(0.5, "strategy.min_contribution"),
-    "contribution x 3": times(3, "strategy.min_contribution"),
+    "contribution x 2": times(2, "strategy.min_contribution"),
     "lobes": _LOBES,
     "lobes, mcmc": {**_LOBES, **_MCMC},
     "lobes, moves x 2": times(2, *_MOVES, of=_LOBES),
@@ -202,7 +223,7 @@ def _fitted(capture: Path, variant: str, seed: int, size: Size, device: str | No
         seed=seed,
         device=device,
         **asdict(size),
-        **VARIANTS[variant],
+        **in_numbers(VARIANTS[variant], size.steps),
     )
     took = time.process_time() - began
     scores = fitted.metrics["scores"]["held out"]
@@ -247,7 +268,9 @@ def _cell(fits: Sequence[Scores], variant: str, capture: str) -> str:
 def _words(settings: Settings) -> str:
     """Options as a command line takes them."""
     return " ".join(
-        f"`--{name.replace('_', '-')} {value:.4g}`"
+        f"`--{name.replace('_', '-')}` x {value.factor:g}"
+        if isinstance(value, Times)
+        else f"`--{name.replace('_', '-')} {value:.4g}`"
         if isinstance(value, float)
         else f"`--{name.replace('_', '-')} {value}`"
         for name, value in settings.items()

@@ -11,7 +11,7 @@ from dataclasses import dataclass, field, fields, replace
 from typing import Literal, TypeVar, get_args
 
 from rift_cl.errors import SettingError
-from rift_cl.option_marks import Expert, NoOption, Short, ShortAuto, ShortExpert, ShortSplats
+from rift_cl.option_marks import Auto, Expert, NoOption, Short, ShortAuto, ShortExpert, ShortSplats
 from rift_cl.splat.orders import count_of
 from rift_cl.train.basis_settings import AngularSettings, BasisSettings
 from rift_cl.train.environment_settings import EnvironmentSettings
@@ -24,6 +24,9 @@ from rift_cl.train.xray.solve_settings import SolveSettings
 
 BandLimit = Literal["pixels", "coverage"]
 
+
+# Learning rate of positions in runs of no more than so many steps.
+_MEANS, _SHORT_RUN = 1.28e-3, 1500
 
 T = TypeVar("T", bound="TrainSettings")
 _STRATEGY_HELP = (
@@ -42,8 +45,9 @@ class LearningRates:
         InputError: a number is out of its range.
     """
 
-    means: float = 1.28e-3
-    """Learning rate of positions, as a fraction of the scene's extent."""
+    means: Auto[float] = None
+    """Learning rate of positions, as a fraction of the scene's extent. Default: 1.28e-3, or less in
+    runs of more than 1,500 steps, in inverse proportion to them."""
     means_last: float = 0.01
     """Learning rate of positions at the cooldown, as a fraction of the first; it falls
     exponentially until then."""
@@ -89,8 +93,18 @@ class LearningRates:
         for item in fields(self):
             if item.name in ("means_last", "shapes_last"):
                 check_number(self, item.name, most=1, above=True)
-            else:
+            elif getattr(self, item.name) is not None:
                 check_number(self, item.name)
+
+    def decided(self, steps: int) -> LearningRates:
+        """These rates, with that of positions decided by the steps of the run if it was left open.
+
+        What Adam adds up to is the rate times the steps. Where that is far more than splats have to
+        move, they drift apart and shrink, and the fit is lost.
+        """
+        if self.means is not None:
+            return self
+        return replace(self, means=_MEANS * min(1.0, _SHORT_RUN / steps))
 
 
 @dataclass(frozen=True)
@@ -218,4 +232,5 @@ class TrainSettings:
             basis=self.basis.decided(),
             homogenisation=self.homogenisation.decided(views),
             strategy=self.strategy.decided(),
+            learning_rates=self.learning_rates.decided(self.steps),
         )

@@ -19,6 +19,7 @@ from rift_cl.train.strategy import DefaultSettings
 CLASSES = {"fit photos": FitPhotosSettings, "fit xray": FitXraySettings}
 # Other values, for options that do not take every one of their type.
 OTHERS = {
+    "learning_rates.means": 1e-3,
     "basis": "hermite",
     "geometry": Path("geometry.yaml"),
     "activation": "exp",
@@ -79,7 +80,7 @@ def other_value(option):
 @pytest.mark.parametrize(
     ("job", "kind"),
     [("fit photos", {}), ("fit photos", {"strategy": "default"}), ("fit xray", {})],
-    ids=["mcmc", "default", "xray"],
+    ids=["residual", "default", "xray"],
 )
 def test_every_setting_is_an_option(monkeypatch, job, kind):
     usual = CLASSES[job].of(Path("what"), Path("rift-fit"), **kind)

@@ -217,6 +217,18 @@ def test_it_looks_at_the_views_before_a_relocation_and_relocates_until_its_last(
     assert [s for s in range(1000) if all_of_them.looks_at(s)] == list(range(100, 800))
 
 
+def test_a_long_run_has_no_more_relocations_than_there_may_be(device):
+    settings = ResidualSettings(first=100, every=50, relocations=10, last=1.0)
+    strategy = settings.begin(parameters_of(device), replace(RUN, steps=3000))
+    relocated = [step for step in range(3000) if strategy.relocates_at(step)]
+    assert relocated == list(range(300, 3000, 300))
+    assert [sum(strategy.looks_at(step) for step in range(at - 300, at)) for at in relocated] == [
+        settings.views
+    ] * len(relocated)
+    short = settings.begin(parameters_of(device), replace(RUN, steps=400))
+    assert [s for s in range(400) if short.relocates_at(s)] == list(range(100, 400, 50))
+
+
 def test_what_was_seen_is_kept_and_checked(device):
     parameters = parameters_of(device)
     strategy = ResidualSettings().begin(parameters, RUN)

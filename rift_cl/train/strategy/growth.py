@@ -78,12 +78,17 @@ class GrowthStrategy(Strategy):
 
     def relocates_at(self, step: int) -> bool:
         """Whether splats are relocated after so many steps."""
-        settings = self._growing
-        return step >= settings.first and step % settings.every == 0 and step < self.run.steps
+        first = self._growing.first
+        return step >= first and step % self.spacing == 0 and step < self.run.steps
+
+    @property
+    def spacing(self) -> int:
+        """Steps between two relocations."""
+        return self._growing.every
 
     def forecast(self, step: int, count: int) -> Iterator[tuple[int, int]]:
         """Growth follows from the number of splats alone; see ``Strategy``."""
-        run, every = self.run, self._growing.every
+        run, every = self.run, self.spacing
         next_one = every * (max(step, self._growing.first - 1) // every + 1)
         for until in range(next_one, run.steps, every):
             yield until - step, count
@@ -96,7 +101,7 @@ class GrowthStrategy(Strategy):
         settings, run = self._growing, self.run
         if step >= run.steps * settings.last:
             return 0.0
-        left = max(1, int(run.steps * settings.full - step) // settings.every + 1)
+        left = max(1, int(run.steps * settings.full - step) // self.spacing + 1)
         needed = (run.splats / count) ** (1 / left) - 1
         return max(settings.growth, min(needed, _MOST_GROWTH)) if settings.growth else 0.0
 

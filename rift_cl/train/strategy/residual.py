@@ -60,7 +60,9 @@ class ResidualSettings(GrowthSettings):
     """
 
     every: int = 50
-    """Steps between two relocations."""
+    """Fewest steps between two relocations."""
+    relocations: int = 50
+    """Most relocations of a run, evenly spaced over all of its steps."""
     first: int = 100
     """Step of the first relocation."""
     last: float = 0.85
@@ -72,13 +74,14 @@ class ResidualSettings(GrowthSettings):
     views: int = 20
     """Training views before a relocation that say what each splat contributes: those of so many
     steps, or of all since the last relocation where these are fewer."""
-    min_contribution: float = 0.2
+    min_contribution: float = 0.1
     """Contribution up to which a splat is relocated, as a fraction of the median contribution: how
     many pixels it makes up in a view that looks at it."""
 
     def __post_init__(self) -> None:
         """Check every number's range."""
         super().__post_init__()
+        check_whole(self, "relocations", 1)
         check_whole(self, "views", 1)
         check_number(self, "min_contribution", most=1)
 
@@ -197,13 +200,18 @@ class ResidualStrategy(GrowthStrategy):
         self.settings = settings
         self.contributions = Contributions(parameters.device, len(parameters))
 
+    @property
+    def spacing(self) -> int:
+        """As many steps as leave a long run no more relocations than there may be."""
+        return max(self.settings.every, self.run.steps // self.settings.relocations)
+
     def relocates_at(self, step: int) -> bool:
         """Not beyond a fraction of the run either."""
         return super().relocates_at(step) and step < self.settings.last * self.run.steps
 
     def looks_at(self, step: int) -> bool:
         """At the last views before each relocation; see ``Strategy``."""
-        ahead = self.settings.every - 1 - step % self.settings.every
+        ahead = self.spacing - 1 - step % self.spacing
         return ahead < self.settings.views and self.relocates_at(step + 1 + ahead)
 
     def look(
