@@ -33,7 +33,6 @@ from rift_cl.commands.fit_photos.presets import PRESETS
 from rift_cl.commands.fit_photos.settings import FitPhotosSettings
 from rift_cl.commands.run_folder.saved_settings import options_of
 from rift_cl.io import write_text
-from rift_cl.train import LearningRates
 
 Settings = Mapping[str, Any]
 # What all gains are over.
@@ -48,30 +47,10 @@ _SCALES = "strategy.scale_penalty"
 _MCMC = {"strategy": "mcmc"}
 
 
-@dataclass(frozen=True)
-class Times:
-    """A learning rate of positions, as a multiple of that of a fit of so many steps by default."""
-
-    factor: float
-
-
 def times(factor: float, *names: str, of: Settings | None = None) -> Settings:
     """Settings in which some values are larger by a factor than in others, or by default."""
     begun = {} if of is None else dict(of)
-    usual = {name: begun.get(name, _USUAL[name]) for name in names}
-    larger = {
-        name: Times(factor) if value is None else factor * value for name, value in usual.items()
-    }
-    return {**begun, **larger}
-
-
-def in_numbers(variant: Settings, steps: int) -> Settings:
-    """The settings of a variant for fits of so many steps."""
-    means = LearningRates().decided(steps).means or 0.0
-    return {
-        name: value.factor * means if isinstance(value, Times) else value
-        for name, value in variant.items()
-    }
+    return {**begun, **{name: factor * begun.get(name, _USUAL[name]) for name in names}}
 
 
 _MOVES = (_MEANS, *_SHAPES)
@@ -223,7 +202,7 @@ def _fitted(capture: Path, variant: str, seed: int, size: Size, device: str | No
         seed=seed,
         device=device,
         **asdict(size),
-        **in_numbers(VARIANTS[variant], size.steps),
+        **VARIANTS[variant],
     )
     took = time.process_time() - began
     scores = fitted.metrics["scores"]["held out"]
@@ -268,9 +247,7 @@ def _cell(fits: Sequence[Scores], variant: str, capture: str) -> str:
 def _words(settings: Settings) -> str:
     """Options as a command line takes them."""
     return " ".join(
-        f"`--{name.replace('_', '-')}` x {value.factor:g}"
-        if isinstance(value, Times)
-        else f"`--{name.replace('_', '-')} {value:.4g}`"
+        f"`--{name.replace('_', '-')} {value:.4g}`"
         if isinstance(value, float)
         else f"`--{name.replace('_', '-')} {value}`"
         for name, value in settings.items()

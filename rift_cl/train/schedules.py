@@ -47,15 +47,14 @@ class LearningRateSchedule:
 
     def learning_rates(self, step: int) -> dict[str, float]:
         """Adam's learning rates at a step, by group; of positions in units of the scene."""
-        settings = self.settings
-        rates = settings.learning_rates.decided(settings.steps)
+        rates, settings = self.settings.learning_rates, self.settings
         way = min(step / max(self.cooldown, 1), 1.0)
         falling, shapes, fade = rates.means_last**way, rates.shapes_last**way, 1.0
         if step >= self.cooldown:
             into = (step - self.cooldown) / max(settings.steps - self.cooldown, 1)
             fade = _LAST_SHARE**into
         return {
-            "means": fade * self.extent * (rates.means or 0.0) * falling,
+            "means": fade * self.extent * rates.first_means(settings.steps) * falling,
             "quats": fade * rates.quats * shapes,
             "log_scales": fade * rates.log_scales * shapes,
             "logits": fade * rates.logits,

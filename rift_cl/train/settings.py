@@ -11,7 +11,7 @@ from dataclasses import dataclass, field, fields, replace
 from typing import Literal, TypeVar, get_args
 
 from rift_cl.errors import SettingError
-from rift_cl.option_marks import Auto, Expert, NoOption, Short, ShortAuto, ShortExpert, ShortSplats
+from rift_cl.option_marks import Expert, NoOption, Short, ShortAuto, ShortExpert, ShortSplats
 from rift_cl.splat.orders import count_of
 from rift_cl.train.basis_settings import AngularSettings, BasisSettings
 from rift_cl.train.environment_settings import EnvironmentSettings
@@ -24,9 +24,6 @@ from rift_cl.train.xray.solve_settings import SolveSettings
 
 BandLimit = Literal["pixels", "coverage"]
 
-
-# Learning rate of positions in runs of no more than so many steps.
-_MEANS, _SHORT_RUN = 1.28e-3, 1500
 
 T = TypeVar("T", bound="TrainSettings")
 _STRATEGY_HELP = (
@@ -45,9 +42,13 @@ class LearningRates:
         InputError: a number is out of its range.
     """
 
-    means: Auto[float] = None
-    """Learning rate of positions, as a fraction of the scene's extent. Default: 1.28e-3, or less in
-    runs of more than 1,500 steps, in inverse proportion to them."""
+    means: float = 1.28e-3
+    """Learning rate of positions, as a fraction of the scene's extent."""
+    # What Adam adds up to is the rate times the steps. Where that is far more than splats have to
+    # move, they drift apart and shrink, and fits of 10,000 steps and more are lost.
+    means_steps: int = 1500
+    """Most steps of a run that has that learning rate of positions; longer ones have less, in
+    inverse proportion to their steps (0 = none has less)."""
     means_last: float = 0.01
     """Learning rate of positions at the cooldown, as a fraction of the first; it falls
     exponentially until then."""
@@ -91,20 +92,16 @@ class LearningRates:
     def __post_init__(self) -> None:
         """Check every number's range."""
         for item in fields(self):
-            if item.name in ("means_last", "shapes_last"):
+            if item.name == "means_steps":
+                check_whole(self, item.name, 0)
+            elif item.name in ("means_last", "shapes_last"):
                 check_number(self, item.name, most=1, above=True)
-            elif getattr(self, item.name) is not None:
+            else:
                 check_number(self, item.name)
 
-    def decided(self, steps: int) -> LearningRates:
-        """These rates, with that of positions decided by the steps of the run if it was left open.
-
-        What Adam adds up to is the rate times the steps. Where that is far more than splats have to
-        move, they drift apart and shrink, and the fit is lost.
-        """
-        if self.means is not None:
-            return self
-        return replace(self, means=_MEANS * min(1.0, _SHORT_RUN / steps))
+    def first_means(self, steps: int) -> float:
+        """Learning rate of positions at the first of so many steps."""
+        return self.means * min(1.0, self.means_steps / steps) if self.means_steps else self.means
 
 
 @dataclass(frozen=True)
@@ -232,5 +229,4 @@ class TrainSettings:
             basis=self.basis.decided(),
             homogenisation=self.homogenisation.decided(views),
             strategy=self.strategy.decided(),
-            learning_rates=self.learning_rates.decided(self.steps),
         )

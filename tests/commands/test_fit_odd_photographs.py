@@ -8,10 +8,8 @@ import numpy as np
 import pytest
 
 from rift_cl.commands.cli import main
-from rift_cl.commands.fit_photos.report import rate_notes
 from rift_cl.commands.fit_photos.scores import ViewScore, brightness_spread
 from rift_cl.io.images.image import read_image, write_png
-from rift_cl.train import LearningRates, TrainSettings
 
 
 def changed(capture, folder, change):
@@ -50,16 +48,6 @@ def test_photographs_of_nothing_are_told(capture, tmp_path, capsys):
     blank = changed(capture, tmp_path / "blank", lambda k, image: 0 * image + 0.5)
     assert "background" in told(blank, tmp_path / "fit", capsys, "--steps", 5)
     assert (tmp_path / "fit" / "scene.ply").is_file()
-
-
-def test_positions_that_learn_too_fast_for_so_many_steps_are_said():
-    def notes(steps, means):
-        rates = LearningRates(means=means)
-        return rate_notes(TrainSettings(steps=steps, learning_rates=rates))
-
-    assert notes(30_000, None) == notes(30_000, 1.6e-4) == notes(3000, 1.28e-3) == []
-    (note,) = notes(30_000, 1.28e-3)
-    assert "0.00128" in note and "30000 steps is 6.4e-05" in note
 
 
 def test_brightness_is_a_factor_of_each_picture():

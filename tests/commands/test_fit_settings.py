@@ -19,7 +19,6 @@ from rift_cl.train.strategy import DefaultSettings
 CLASSES = {"fit photos": FitPhotosSettings, "fit xray": FitXraySettings}
 # Other values, for options that do not take every one of their type.
 OTHERS = {
-    "learning_rates.means": 1e-3,
     "basis": "hermite",
     "geometry": Path("geometry.yaml"),
     "activation": "exp",

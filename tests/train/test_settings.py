@@ -8,6 +8,7 @@ import pytest
 
 from rift_cl.errors import InputError, SettingError
 from rift_cl.train.environment_settings import EnvironmentSettings
+from rift_cl.train.schedules import LearningRateSchedule
 from rift_cl.train.settings import LearningRates, TrainSettings
 from rift_cl.train.strategy import (
     DefaultSettings,
@@ -95,18 +96,15 @@ def test_zero_switches_off_what_can_be_switched_off():
     assert DefaultSettings(reset=0, prune_screen_size=None).reset == 0
 
 
-def test_positions_learn_slower_in_longer_runs_and_as_is_said_where_it_is_said():
-    def decided(steps, **rates):
-        settings = TrainSettings(steps=steps, learning_rates=LearningRates(**rates))
-        return settings.decided(views=50).learning_rates.means
-
-    assert decided(100) == decided(1500) == 1.28e-3
+def test_positions_learn_slower_in_longer_runs():
+    rates = LearningRates(means=1e-3, means_steps=500)
+    assert rates.first_means(100) == rates.first_means(500) == 1e-3
     # What they add up to does not grow with the steps: that lost fits of 10,000 and more.
-    assert [steps * decided(steps) for steps in (3000, 30_000)] == pytest.approx([1.92, 1.92])
-    assert decided(30_000, means=1e-3) == 1e-3
-    assert decided(30_000, means=0) == 0
-    rates = XrayTrainSettings(steps=30_000).decided(views=50).learning_rates
-    assert rates.means == 6e-4
+    assert rates.first_means(2000) * 2000 == pytest.approx(500 * 1e-3)
+    assert LearningRates(means=1e-3, means_steps=0).first_means(30_000) == 1e-3
+    for kind, wanted in ((TrainSettings, 6.4e-5), (XrayTrainSettings, 6e-4)):
+        first = LearningRateSchedule(kind(steps=30_000), extent=2.0).learning_rates(0)["means"]
+        assert first == pytest.approx(2 * wanted)
 
 
 def test_the_threshold_follows_the_kind_of_gradient():

@@ -20,7 +20,6 @@ from rift_cl.commands.fit_photos.report import (
     fit_page,
     history_notes,
     ramp_notes,
-    rate_notes,
 )
 from rift_cl.commands.fit_photos.scores import error_record, score_record, score_views
 from rift_cl.commands.fit_photos.settings import FitPhotosSettings
@@ -274,7 +273,6 @@ class Fit(FitRun[FitPhotosSettings]):
             )
         if self.settings.downscale is None and self.downscale > 1:
             notes.append(size_words(self.training_views, self.downscale))
-        notes += rate_notes(self.settings.training)
         return notes
 
     def _trainer(

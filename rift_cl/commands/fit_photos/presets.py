@@ -23,6 +23,7 @@ PRESETS: Mapping[str, Mapping[str, Any]] = {
         "sh_every": 1 / 6,
         "angular.first": 0.15,
         "learning_rates.means": 1.6e-4,
+        "learning_rates.means_steps": 0,
         "learning_rates.quats": 1e-3,
         "learning_rates.log_scales": 5e-3,
         "learning_rates.sh_rest": 0.2,

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 from functools import partial
 from typing import Any
 
@@ -16,14 +15,10 @@ from rift_cl.commands.pictures.evenly_spaced import evenly
 from rift_cl.report.html_page import Compared, Page
 from rift_cl.report.plot import curves, figure_svgs, jpeg
 from rift_cl.train.loss.homogenisation import ENOUGH_VIEWS, USUAL_EXPONENT
-from rift_cl.train.settings import TrainSettings
 
 _SHOWN = 3
 # A fit of photographs of one exposure is off by a percent or so in brightness from one to the next.
 _STEADY = 0.04
-# Positions that learn so many times as fast as by default cost half a decibel in fits of 10,000
-# steps, and seven times five (tools/search_defaults.py).
-_HIGH_RATE = 3.0
 # Errors are shown this much brighter.
 ERROR_GAIN = 5.0
 
@@ -113,19 +108,6 @@ def ramp_notes(settings: FitPhotosSettings, views: int) -> list[str]:
         f"The ramp that weighs the residual's frequencies was off: with {views} photographs, fewer "
         f"than {ENOUGH_VIEWS}, it was never found to help. --homogenise {USUAL_EXPONENT:g} "
         "turns it on."
-    ]
-
-
-def rate_notes(settings: TrainSettings) -> list[str]:
-    """A sentence about a learning rate of positions that is too high for so many steps."""
-    rates, steps = settings.learning_rates, settings.steps
-    usual = replace(rates, means=None).decided(steps).means
-    if rates.means is None or usual is None or rates.means <= _HIGH_RATE * usual:
-        return []
-    return [
-        f"Positions learn at {rates.means:g}, and the default for {steps} steps is {usual:g}: "
-        "splats that move so far in all can drift apart until nothing is left of them. Without "
-        "--learning-rates.means the rate goes by the steps."
     ]
 
 

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field, replace
 from typing import TypeVar
 
 from rift_cl.errors import SettingError
-from rift_cl.option_marks import Auto, Expert, NoOption, Short, ShortExpert, ShortSplats
+from rift_cl.option_marks import Expert, NoOption, Short, ShortExpert, ShortSplats
 from rift_cl.splat.settings import Activation
 from rift_cl.train.basis_settings import AngularSettings, BasisSettings
 from rift_cl.train.environment_settings import EnvironmentSettings
@@ -27,7 +27,8 @@ class XrayLearningRates(LearningRates):
     """Adam's learning rates of densities at the first step; 0 = not trained."""
 
     # The start is near already, so that positions may move fast and need not slow down by much.
-    means: Auto[float] = 6e-4
+    means: float = 6e-4
+    means_steps: int = 0
     means_last: float = 0.1
     quats: float = 2e-2
     log_scales: float = 2e-2
@@ -97,5 +98,5 @@ class XrayTrainSettings(TrainSettings):
         found = super().decided(views)
         if not self.solve.every:
             return found
-        rates = replace(found.learning_rates, logits=0.0, shape_modes=0.0)
+        rates = replace(self.learning_rates, logits=0.0, shape_modes=0.0)
         return replace(found, learning_rates=rates)
