@@ -48,6 +48,14 @@ def photographs(tmp_path) -> Path:
     return folder
 
 
+def test_photographs_of_formats_that_are_not_read_are_named(photographs, tmp_path, posed, capsys):
+    (photographs / "IMG_5.webp").write_bytes(b"odd")
+    assert main(["fit", str(photographs), "--out", str(tmp_path / "fit"), *SHORT]) == 0
+    assert "a photograph is of a format that is not read: IMG_5.webp; convert" in (
+        capsys.readouterr().err
+    )
+
+
 def test_what_is_odd_in_a_folder_is_said_in_two_lines(photographs, tmp_path, posed, capsys):
     shutil.copy(photographs / "IMG_1.png", photographs / "IMG_1 (1).png")
     for name in (".DS_Store", "IMG_0.AAE", "IMG_0.MOV", "notes.txt", "Thumbs.db"):

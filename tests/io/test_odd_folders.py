@@ -17,14 +17,20 @@ from view_files import store
 from rift_cl.commands.cameras.fit_cameras import save_fit_cameras
 from rift_cl.errors import InputError, PathEscapeError
 from rift_cl.io import open_capture, pose_photographs, read_image, read_view
-from rift_cl.io.captures.photograph_folder import other_files, photograph_names, photographs_in
+from rift_cl.io.captures.photograph_folder import (
+    other_files,
+    photograph_names,
+    photographs_in,
+    unread_photographs,
+)
 from rift_cl.io.captures.transforms_json import open_transforms
 
 ODD = [".DS_Store", "._a b.png", "IMG_1.AAE", "IMG_1.MOV", "Thumbs.db", "notes.txt"]
 
 
 def test_other_files_are_told_apart_from_photographs_and_masks(folder: Path) -> None:
-    for name in ODD:
+    unread = ["IMG_1.CR3", "IMG_2.webp"]
+    for name in [*ODD, *unread]:
         (folder / name).write_bytes(b"odd")
     made.photographs(folder, ["c_mask.png", "d_mask.png"])
     (folder / "small").mkdir()
@@ -32,6 +38,13 @@ def test_other_files_are_told_apart_from_photographs_and_masks(folder: Path) -> 
     # d_mask.png belongs to no photograph, so it is one.
     assert photograph_names(place) == sorted([*NAMES, "d_mask.png"])
     assert other_files(place) == sorted(ODD)
+    assert unread_photographs(place) == unread
+
+
+def test_a_folder_of_raw_files_alone_says_what_to_do(tmp_path: Path) -> None:
+    (tmp_path / "DSC_1.NEF").write_bytes(b"odd")
+    with pytest.raises(InputError, match=r"DSC_1\.NEF is of a format .* PNG or JPEG"):
+        open_capture(tmp_path)
 
 
 def test_damaged_ones_and_duplicates_are_left_out_and_named(

@@ -11,7 +11,11 @@ from pathlib import Path
 
 from rift_cl.io.captures.capture import Capture, holds_bare_photographs, open_capture
 from rift_cl.io.captures.colmap_process import check_pycolmap
-from rift_cl.io.captures.photograph_folder import other_files, photographs_in
+from rift_cl.io.captures.photograph_folder import (
+    other_files,
+    photographs_in,
+    unread_photographs,
+)
 from rift_cl.io.captures.photographs import check_photographs, pose_photographs
 from rift_cl.io.captures.video import check_video, holds_video, sharpest_frames, video_notes
 from rift_cl.progress import Report
@@ -69,11 +73,8 @@ class BareInput:
             taken, total = yield from sharpest_frames(self.source, self.folder, self._frames)
             self.notes.append(f"{taken} of the video's {total} frames are taken, the sharpest")
             self.notes += video_notes(self.source)
-        elif others := other_files(photographs_in(self.folder)):
-            count = f"{len(others)} files that are no photographs are"
-            if len(others) == 1:
-                count = "a file that is no photograph is"
-            self.notes.append(f"{count} left alone: {listed(others)}")
+        else:
+            self.notes += _left_alone(self.folder)
         found = yield from pose_photographs(self.folder, self._posed, seed=self._seed)
         self.photographs = len(found.placed) + len(found.missing)
         if found.missing:
@@ -81,6 +82,22 @@ class BareInput:
         capture = open_capture(found.model, images=self.folder)
         self.notes.append(_placed(capture, self.photographs))
         return capture
+
+
+def _left_alone(folder: Path) -> list[str]:
+    """Which files of a folder are not used: photographs that are not read, and other files."""
+    notes, place = [], photographs_in(folder)
+    if unread := unread_photographs(place):
+        count = f"{len(unread)} photographs are of formats that are"
+        if len(unread) == 1:
+            count = "a photograph is of a format that is"
+        notes.append(f"{count} not read: {listed(unread)}; convert to PNG or JPEG to use them")
+    if others := other_files(place):
+        count = f"{len(others)} files that are no photographs are"
+        if len(others) == 1:
+            count = "a file that is no photograph is"
+        notes.append(f"{count} left alone: {listed(others)}")
+    return notes
 
 
 def _placed(capture: Capture, count: int) -> str:

@@ -8,7 +8,12 @@ from pathlib import Path
 from rift_cl.errors import InputError
 from rift_cl.io.boundary import reading
 from rift_cl.io.captures.colmap_model import MODEL_FOLDERS, find_model, open_model
-from rift_cl.io.captures.photograph_folder import other_files, photograph_names, photographs_in
+from rift_cl.io.captures.photograph_folder import (
+    other_files,
+    photograph_names,
+    photographs_in,
+    unread_photographs,
+)
 from rift_cl.io.captures.transforms_json import open_transforms
 from rift_cl.io.captures.video import is_video
 from rift_cl.io.captures.view import Capture, View, as_pinholes, camera_at
@@ -76,6 +81,9 @@ def open_capture(
     video = next((name for name in other_files(photographs_in(path)) if is_video(name)), None)
     if not bare and video is not None:
         bare, hint = [video], f"; 'rift fit' takes the video {video} itself"
+    elif not bare and (unread := unread_photographs(photographs_in(path))):
+        bare = unread
+        hint = f"; {unread[0]} is of a format that is not read: convert photographs to PNG or JPEG"
     raise InputError(
         f"{path}: holds no capture; looked for {' and '.join(_TRANSFORMS)}, and for cameras "
         f"and images, .bin or .txt, of a COLMAP model in {', '.join(MODEL_FOLDERS)}"

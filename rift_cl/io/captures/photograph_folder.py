@@ -28,6 +28,11 @@ from rift_cl.progress import Report
 
 # Formats that every release of COLMAP reads code for code.
 _PLAIN = (".png", ".jpg", ".jpeg")
+# Photographs, too, of formats that are not read: raw files of cameras, and what the web uses.
+_UNREAD = (
+    *(".arw", ".cr2", ".cr3", ".dng", ".nef", ".orf", ".pef", ".raf", ".raw", ".rw2", ".srw"),
+    *(".avif", ".bmp", ".gif", ".jp2", ".jxl", ".psd", ".tga", ".webp"),
+)
 
 
 @dataclass(frozen=True)
@@ -86,7 +91,21 @@ def other_files(place: CaptureFolder) -> list[str]:
     """
     names = photograph_names(place)
     ours = {*names, *map(mask_beside, names)}
-    return [shown(name) for name in _file_names(place) if name not in ours]
+    rest = [name for name in _file_names(place) if name not in ours]
+    return [shown(name) for name in rest if not _unread(name)]
+
+
+def unread_photographs(place: CaptureFolder) -> list[str]:
+    """Names of the files in a folder that are photographs of formats that are not read, in order.
+
+    Raises:
+        InputError: there is no such folder, or it may not be read.
+    """
+    return [shown(name) for name in _file_names(place) if _unread(name)]
+
+
+def _unread(name: str) -> bool:
+    return Path(name).suffix.lower() in _UNREAD and not name.startswith(".")
 
 
 def _file_names(place: CaptureFolder) -> list[str]:
