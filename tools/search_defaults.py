@@ -64,6 +64,7 @@ VARIANTS: dict[str, Settings] = {
     "scales and rotations / 2": times(0.5, *_SHAPES),
     "positions x 2": times(2, _MEANS),
     "positions / 2": times(0.5, _MEANS),
+    "positions as in short runs": {f"{_MEANS}_steps": 0},
     "shapes fall": {"learning_rates.shapes_last": 0.25},
     "no ramp": {"homogenise": 0.0},
     "linear light": {"light": "linear"},
