@@ -222,6 +222,17 @@ def test_a_run_killed_in_its_last_write_keeps_its_frames(scene, tmp_path, monkey
     assert {path: path.stat().st_mtime_ns for path in frames} == frames
 
 
+@pytest.mark.parametrize("name", ["film.webm", "slices.TIF"])
+def test_a_folder_that_is_called_as_a_file_is_refused(tmp_path, name):
+    with pytest.raises(OutputError, match=f"{name}: ends as a file .* --out {name[:4]}"):
+        RunFolder(tmp_path / name, "render")
+    assert not [*tmp_path.iterdir()]
+    # One that is there, and a name with another point, are folders.
+    (tmp_path / name).mkdir()
+    RunFolder(tmp_path / name, "render")
+    RunFolder(tmp_path / "ball_0.5", "render")
+
+
 @pytest.mark.parametrize("content", [b"[" * 200_000, b'{"job": 1'])
 def test_a_forged_record_holds_no_run(tmp_path, content):
     config = tmp_path / "config.json"

@@ -41,6 +41,14 @@ _FREE = (
 )
 
 
+# Endings of files that people may have meant to name by --out.
+_OF_FILES = (
+    *(".gif", ".jpeg", ".jpg", ".mov", ".mp4", ".png", ".webm", ".webp"),
+    *(".csv", ".glb", ".h5", ".hdf5", ".html", ".json", ".nii", ".npy", ".npz", ".obj", ".pdf"),
+    *(".ply", ".raw", ".spz", ".tif", ".tiff", ".vti", ".zip"),
+)
+
+
 class RunFolder:
     """A run's folder.
 
@@ -75,6 +83,11 @@ class RunFolder:
         self._read = None if settings is None else _stamps(settings, path)
         self._overwrite = overwrite
         self._seen = self._config_stamp()
+        if path.suffix.lower() in _OF_FILES and not path.is_dir():
+            raise OutputError(
+                f"{path}: ends as a file does, and is to be the folder of all that a run writes; "
+                f"name one, such as --out {path.stem}"
+            )
         above = next(parent for parent in path.absolute().parents if parent.exists())
         if not above.is_dir():
             raise OutputError(f"{path}: {above} is no folder; name another place (--out)")
