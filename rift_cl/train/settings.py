@@ -45,7 +45,7 @@ class LearningRates:
     means: float = 1.28e-3
     """Learning rate of positions, as a fraction of the scene's extent."""
     # What Adam adds up to is the rate times the steps. Where that is far more than splats have to
-    # move, they drift apart and shrink, and fits of 10,000 steps and more are lost.
+    # move, they drift apart and shrink: a fit of 30,000 steps is lost.
     means_steps: int = 1500
     """Most steps of a run that has that learning rate of positions; longer ones have less, in
     inverse proportion to their steps (0 = none has less)."""

@@ -99,7 +99,7 @@ def test_zero_switches_off_what_can_be_switched_off():
 def test_positions_learn_slower_in_longer_runs():
     rates = LearningRates(means=1e-3, means_steps=500)
     assert rates.first_means(100) == rates.first_means(500) == 1e-3
-    # What they add up to does not grow with the steps: that lost fits of 10,000 and more.
+    # What they add up to does not grow with the steps: that lost fits of 30,000.
     assert rates.first_means(2000) * 2000 == pytest.approx(500 * 1e-3)
     assert LearningRates(means=1e-3, means_steps=0).first_means(30_000) == 1e-3
     for kind, wanted in ((TrainSettings, 6.4e-5), (XrayTrainSettings, 6e-4)):
