@@ -45,10 +45,10 @@ class LearningRates:
     means: float = 1.28e-3
     """Learning rate of positions, as a fraction of the scene's extent."""
     # What Adam adds up to is the rate times the steps. Where that is far more than splats have to
-    # move, they drift apart and shrink: a fit of 30,000 steps is lost.
+    # move, they drift apart and shrink, in fits of 30,000 steps.
     means_steps: int = 1500
-    """Most steps of a run that has that learning rate of positions; longer ones have less, in
-    inverse proportion to their steps (0 = none has less)."""
+    """Number of steps up to which a run has this learning rate of positions; longer runs have a
+    lower one, in inverse proportion to their steps (0 = the same in all runs)."""
     means_last: float = 0.01
     """Learning rate of positions at the cooldown, as a fraction of the first; it falls
     exponentially until then."""

@@ -227,6 +227,10 @@ def test_a_long_run_has_no_more_relocations_than_there_may_be(device):
     ] * len(relocated)
     short = settings.begin(parameters_of(device), replace(RUN, steps=400))
     assert [s for s in range(400) if short.relocates_at(s)] == list(range(100, 400, 50))
+    uneven = replace(settings, first=0, every=1).begin(
+        parameters_of(device), replace(RUN, steps=19)
+    )
+    assert [s for s in range(1, 19) if uneven.relocates_at(s)] == list(range(2, 19, 2))
 
 
 def test_what_was_seen_is_kept_and_checked(device):

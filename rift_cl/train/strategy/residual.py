@@ -21,6 +21,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from math import ceil
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -62,7 +63,7 @@ class ResidualSettings(GrowthSettings):
     every: int = 50
     """Fewest steps between two relocations."""
     relocations: int = 50
-    """Most relocations of a run, evenly spaced over all of its steps."""
+    """Largest number of relocations in a run: they are further apart in a long one."""
     first: int = 100
     """Step of the first relocation."""
     last: float = 0.85
@@ -203,7 +204,7 @@ class ResidualStrategy(GrowthStrategy):
     @property
     def spacing(self) -> int:
         """As many steps as leave a long run no more relocations than there may be."""
-        return max(self.settings.every, self.run.steps // self.settings.relocations)
+        return max(self.settings.every, ceil(self.run.steps / self.settings.relocations))
 
     def relocates_at(self, step: int) -> bool:
         """Not beyond a fraction of the run either."""
