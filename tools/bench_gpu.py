@@ -1,6 +1,7 @@
 """Everything that a new device has to show, in one command and one file.
 
     python tools/bench_gpu.py --device radeon --out radeon
+    python tools/bench_gpu.py --device radeon --out radeon --only families kernels --quick
 
 It compares 22 families of kernels with PoCL (``tools/compare_drivers.py``), runs the tests that use
 a device, and measures the kernels beside other packages as far as those are installed
@@ -23,7 +24,7 @@ from collections import deque
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import IO, Any
+from typing import IO, Any, Literal
 
 import tyro
 
@@ -47,6 +48,8 @@ class Options:
         out: path of the result without its ending; .json and .md are written.
         device: which OpenCL device, as RIFT_DEVICE selects it; the default one if not given.
         quick: small families, one case of each test, one size and few repeats.
+        only: parts to run, of families, tests and kernels; all if not given.
+        workers: processes that run tests at the same time.
         against: reference of the families: a device, or an NPZ file of compare_drivers.py --save.
         limit: seconds without a line from a part, after which it is given up.
     """
@@ -54,6 +57,8 @@ class Options:
     out: Path
     device: str | None = None
     quick: bool = False
+    only: tuple[Literal["families", "tests", "kernels"], ...] = ()
+    workers: int = 1
     against: str = "pocl"
     limit: float = 3600.0
 
@@ -69,6 +74,8 @@ def main(options: Options) -> int:
     record: dict[str, Any] = {**surroundings(device), "command": command, "parts": {}}
     with tempfile.TemporaryDirectory() as folder:
         for name, arguments in _parts(options, device.selector, Path(folder)):
+            if options.only and name not in options.only:
+                continue
             say(f"{name}: {' '.join(arguments)}")
             found = Path(folder, f"{name}.json")
             record["parts"][name] = _run(arguments, found, device.selector, options.limit)
@@ -86,10 +93,8 @@ def _parts(options: Options, device: str, folder: Path) -> Iterator[tuple[str, l
     families += ["--against", options.against, "--json", str(folder / "families.json")]
     yield "families", [sys.executable, *families, *(["--tiny"] if quick else [])]
     tests = [str(_TOOLS.parent / "tests" / name) for name in _TESTS]
-    yield (
-        "tests",
-        [sys.executable, "-m", "pytest", "-q", "-m", "plain" if quick else "full", *tests],
-    )
+    pytest = [sys.executable, "-m", "pytest", "-q", "-m", "plain" if quick else "full"]
+    yield "tests", [*pytest, "-n", str(options.workers), "--timeout", str(options.limit), *tests]
     kernels = [str(_TOOLS / "bench_kernels.py"), "--device", device, "--peers"]
     kernels += ["--json", str(folder / "kernels.json")]
     yield "kernels", [sys.executable, *kernels, *(["--quick"] if quick else [])]

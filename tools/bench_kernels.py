@@ -29,7 +29,7 @@ from bench.costs import check_known, check_measured
 from bench.groups import KNOWN, groups
 from bench.limits import LimitMeter, Limits
 from bench.operations import Split, split_record, splits
-from bench.peers import PEERS, ScikitImage
+from bench.peers import PEERS, STACK_PEERS, ScikitImage
 from bench.projections import projection_tasks
 from bench.race import compared
 from bench.rasterizers import RASTERIZERS
@@ -60,8 +60,8 @@ class Options:
         markdown: file for the tables, ready for the documentation.
         keep: folder for the result by date, DATE-DEVICE.json, which tools/compare_benchmarks.py
             compares with others.
-        peers: also run ASTRA, silx, gratopy, scikit-image and a rasterizer in torch, as far as
-            they are installed.
+        peers: also run ASTRA, silx, gratopy, scikit-image and a rasterizer in torch, on a GPU
+            those that use it (ASTRA's CUDA, silx, gratopy, gsplat), as far as they are installed.
         only: name of the one group to measure, as its table has it after "Kernels, "; on the page
             of --markdown, which is there already, that table alone is replaced.
         quick: one size and few repeats.
@@ -158,7 +158,8 @@ def _drives(kernel: str, device: rift.Device) -> bool:
 
 
 def _draw(meter: LimitMeter, options: Options) -> list[Measured]:
-    found, skipped, kinds = [], dict[str, str](), RASTERIZERS if options.peers else ()
+    found, skipped = [], dict[str, str]()
+    kinds = _fitting(RASTERIZERS, meter.device) if options.peers else ()
     for count, size in options.splats or (_QUICK_SPLATS if options.quick else _SPLATS):
         case = SplatCase(count, size, meter.device)
         say(f"{case.name}: {', '.join(['kernels', *(kind.name for kind in kinds)])}")
@@ -190,17 +191,22 @@ def _measure_groups(meter: LimitMeter, options: Options) -> list[Measured]:
 def _measure(
     meter: LimitMeter, case: Case, options: Options, skipped: dict[str, str]
 ) -> Iterator[Measured]:
-    peers = PEERS if options.peers else ()
+    peers = _fitting(PEERS, meter.device) if options.peers else ()
     left_out = dict[str, str]()
-    if peers and case.updates > _ONCE_UPDATES:
-        peers = tuple(peer for peer in PEERS if peer is not ScikitImage)
+    if ScikitImage in peers and case.updates > _ONCE_UPDATES:
+        peers = tuple(peer for peer in peers if peer is not ScikitImage)
         left_out[ScikitImage.name] = "it would take minutes at this size"
     yield _measure_one(
         meter, case, options, kinds=(*_OURS, *peers), skipped=skipped, left_out=left_out
     )
     stack = replace(case, slices=options.slices)
     if stack.slices > 1 and stack.updates <= _STACK_UPDATES:
-        yield _measure_one(meter, stack, options, kinds=_OURS, skipped={}, left_out={})
+        kinds = (*_OURS, *(_fitting(STACK_PEERS, meter.device) if options.peers else ()))
+        yield _measure_one(meter, stack, options, kinds=kinds, skipped={}, left_out={})
+
+
+def _fitting(kinds: Sequence[type[Contender]], device: rift.Device) -> tuple[type[Contender], ...]:
+    return tuple(kind for kind in kinds if kind.fits(device))
 
 
 def _measure_one(
@@ -216,7 +222,8 @@ def _measure_one(
     rounds = options.rounds or (2 if options.quick else 5 if case.updates < 1e8 else 3)
     kernel_splits = splits(meter, projection_tasks(meter.device, case), repeats=rounds)
     say(f"{case.name}: {', '.join(kind.name for kind in kinds)}")
-    once = len(kinds) > len(_OURS) and case.updates > _ONCE_UPDATES
+    slow_peers = len(kinds) > len(_OURS) and meter.device.traits.is_cpu
+    once = slow_peers and case.updates > _ONCE_UPDATES
     lead = compared(
         *(kinds, meter.device, case),
         rounds=1 if once else rounds,

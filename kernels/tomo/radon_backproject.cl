@@ -4,10 +4,11 @@
  *
  * before = plane[slice][i][j] if `add` is set, else 0.
  *
- * Index space: (segments of columns, runs of ROWS rows, slices). Each item owns ROWS x SEGMENT
- * pixels and keeps a row's SEGMENT sums in registers; views are taken VIEWS at a time, so that
- * the pieces of their tables that a run of rows touches stay in the first-level cache. Per LANES
- * pixels and view: two loads, two multiply-adds.
+ * Index space: (items of all columns, runs of ROWS rows, slices). Each item owns ROWS rows of
+ * LANES * BLOCKS pixels and keeps a row's sums in registers. On a CPU views are taken VIEWS at a
+ * time, so that the pieces of their tables that a run of rows touches stay in the first-level cache;
+ * a GPU's item has one row and goes through all views. Per LANES pixels and view: two loads, two
+ * multiply-adds.
  *
  * Columns of the plane are padded to whole segments, rows are not.
  *
@@ -20,7 +21,7 @@
 #define ROWS (LANES == 8 ? 64 : 1)
 #endif
 #ifndef VIEWS
-#define VIEWS 8
+#define VIEWS (LANES == 8 ? 8 : 1 << 30)
 #endif
 
 KERNEL void radon_backproject(
@@ -28,7 +29,7 @@ KERNEL void radon_backproject(
     __global const long4 *restrict geometry, int first, int count, int columns, int rows, int width,
     int add)
 {
-  const int j = (int)get_global_id(0) * SEGMENT;
+  const int j = FIRST_COLUMN((int)get_global_id(0));
   const int row0 = (int)get_global_id(1) * ROWS;
   const int row1 = row0 + ROWS < rows ? row0 + ROWS : rows;
   const int slice = (int)get_global_id(2);
@@ -39,7 +40,7 @@ KERNEL void radon_backproject(
       __global real *pixels = plane + ((long)slice * rows + i) * width + j;
       lanes sum[BLOCKS];
       if (add || view0 > 0) {
-        UNROLL for (int n = 0; n < BLOCKS; n++) sum[n] = LOAD(pixels + n * LANES);
+        UNROLL for (int n = 0; n < BLOCKS; n++) sum[n] = LOAD(pixels + n * STEP);
       } else {
         UNROLL for (int n = 0; n < BLOCKS; n++) sum[n] = 0;
       }
@@ -51,11 +52,11 @@ KERNEL void radon_backproject(
             table + (((long)slice * count + view) * PHASES + r) * columns + WHOLE(position) + j;
         __global const real *next = r == PHASES - 1 ? at - (PHASES - 1) * columns + 1 : at + columns;
         UNROLL for (int n = 0; n < BLOCKS; n++) {
-          sum[n] = MULTIPLY_ADD(u, LOAD(at + n * LANES), sum[n]);
-          sum[n] = MULTIPLY_ADD(w, LOAD(next + n * LANES), sum[n]);
+          sum[n] = MULTIPLY_ADD(u, LOAD(at + n * STEP), sum[n]);
+          sum[n] = MULTIPLY_ADD(w, LOAD(next + n * STEP), sum[n]);
         }
       }
-      UNROLL for (int n = 0; n < BLOCKS; n++) STORE(pixels + n * LANES, sum[n]);
+      UNROLL for (int n = 0; n < BLOCKS; n++) STORE(pixels + n * STEP, sum[n]);
     }
   }
 }

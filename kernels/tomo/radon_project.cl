@@ -4,8 +4,8 @@
  *             + sum over rows i of phase r-1 of w plane[i][k-m],
  *     where the rows of phase PHASES-1 reach F[0] one column further on.
  *
- * Index space: segments of columns and views of this run, then slices. Each item owns SEGMENT
- * columns of one view's table. Rows come sorted by phase (`order`, with `starts` telling where
+ * Index space: items of all columns and views of this run, then slices. Each item owns
+ * LANES * BLOCKS columns of one view's table. Rows come sorted by phase (`order`, with `starts` telling where
  * each phase begins), so that the sums of a phase and of the next stay in registers: one load and
  * two multiply-adds per LANES pixels, no atomics, one order of summation. The table is written
  * column by column (phases together), which is how radon_resample_adjoint reads it.
@@ -40,9 +40,9 @@ static void add_rows(
     const real w = next_weight(position), u = 1.0f - w;
     __global const real *pixels = image + (long)i * (width + 2 * SEGMENT) + SEGMENT + j;
     UNROLL for (int b = 0; b < BLOCKS; b++) {
-      lanes value = LOAD(pixels + b * LANES);
+      lanes value = LOAD(pixels + b * STEP);
       here[b] = here[b] + u * value;
-      if (shift) value = LOAD(pixels + b * LANES - 1);
+      if (shift) value = LOAD(pixels + b * STEP - 1);
       next[b] = next[b] + w * value;
     }
   }
@@ -54,7 +54,7 @@ KERNEL void radon_project(
     __global const int *restrict all_starts, __global const int2 *restrict views,
     int first, int count, int columns, int rows, int width)
 {
-  const int k0 = (int)get_global_id(SEGMENT_AXIS) * SEGMENT;
+  const int k0 = FIRST_COLUMN((int)get_global_id(SEGMENT_AXIS));
   const int number = (int)get_global_id(VIEW_AXIS);
   const int view = first + number;
   const int slice = (int)get_global_id(2);
@@ -80,6 +80,6 @@ KERNEL void radon_project(
     UNROLL for (int r = 0; r < PHASES; r++) block[r] = sums[r][b];
     block[0] = block[0] + next[b];
     TRANSPOSE(block)
-    UNROLL for (int n = 0; n < PHASES; n++) STORE(out + (b * PHASES + n) * LANES, block[n]);
+    UNROLL for (int n = 0; n < PHASES; n++) STORE(out + b * STEP * PHASES + n * LANES, block[n]);
   }
 }

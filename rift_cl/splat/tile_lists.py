@@ -5,9 +5,10 @@ The N splats are sorted by depth once (a stable radix sort of their visible part
 than sorting all M pairs by (tile, depth), and since every step counts chunk by chunk and places in
 the order of the chunks, the lists are the same whatever the device and the number of work-items.
 
-Prefix sums go up and down a pyramid of sums; ``kernels/vector/scan_sum.cl`` and ``scan_place.cl``
-are one step each way. What one work-item counts alone (WHOLE), it sums up on the way. Integers are
-exact, so the result does not depend on how a list was cut.
+A chunk is a work-item's on a CPU and a group's on a GPU, where neighbours find each other's equal
+keys in local memory (``kernels/include/vector/equal_keys.h``). What one work-item counts alone
+(WHOLE), it sums up on the way. Integers are exact, so the result does not depend on how a list was
+cut.
 
 Only M, the number of entries, comes to the host on the way: it is needed to allocate them. All that
 goes by splats is enqueued before it is waited for, so that the device works on meanwhile.
@@ -27,53 +28,14 @@ from rift_cl.cl.budget import plan_chunks
 from rift_cl.cl.device import Device
 from rift_cl.cl.host_arrays import as_device_array, fetch
 from rift_cl.errors import InputError, ResourceLimitError, ShapeError
-
-# A CPU's cores take so many chunks each, which evens their loads, of at least so many elements,
-# below which starting a kernel costs more than running it.
-_CPU_CHUNKS, _CPU_LEAST = 4, 16384
-# A GPU's work-items are many: each takes so few elements of a list.
-GPU_RUN = 64
-
-# For each level of the pyramid: the run that it sums up, and its sums.
-Levels = list[tuple[int, DeviceArray]]
-
-
-def run_length(device: Device, count: int, *, gpu: int) -> int:
-    """Elements that one work-item goes through: a core's share on a CPU, ``gpu`` on a GPU."""
-    if not device.traits.is_cpu:
-        return gpu
-    return max(_CPU_LEAST, pieces(count, _CPU_CHUNKS * device.traits.compute_units))
-
-
-def pieces(count: int, size: int) -> int:
-    """Number of pieces of a size that hold ``count`` elements, at least one."""
-    return max(1, -(-count // size))
-
-
-def scan_levels(device: Device, most: int) -> Levels:
-    """Levels of a scan of at most ``most`` numbers: run lengths and buffers for their sums."""
-    run = run_length(device, most, gpu=GPU_RUN)
-    sums = device.empty(pieces(most, run), np.int64)
-    return [(run, sums), *(scan_levels(device, sums.size) if sums.size > 1 else [])]
-
-
-def exclusive_scan(
-    device: Device, values: DeviceArray, count: int, levels: Levels, *, wide: bool = False
-) -> DeviceArray:
-    """Replace int32 numbers (``wide``: int64) by the sum of all before.
-
-    Returns:
-        An int64 array whose first number is the total; the next scan with these levels takes it.
-    """
-    (run, sums), *above = levels
-    runs, total = pieces(count, run), sums
-    scanning = {"values": values, "sums": sums, "count": count, "run": run}
-    if runs > 1:
-        device.launch("scan_sum", (runs,), **scanning, WIDE=wide)
-        total = exclusive_scan(device, sums, runs, above, wide=True)
-    device.launch("scan_place", (runs,), **scanning, WIDE=wide, WHOLE=runs == 1)
-    return total
-
+from rift_cl.splat.prefix_sums import (
+    Levels,
+    exclusive_scan,
+    for_kind,
+    pieces,
+    run_length,
+    scan_levels,
+)
 
 _MOST = 2**31 - 1
 # Ints that a drawn splat's span has room for; it needs four. Spans are gone when splats are packed,
@@ -82,10 +44,12 @@ _SPAN_ROOM = 16
 # Columns of tiles that the kernels can tell: see ``kernels/include/splat/tile_spans.h``.
 _MOST_ACROSS = 2**24 - 1
 _KEY_BITS = 32
-# A GPU's work-items are many: each takes so few of the pairs.
-_GPU_PAIRS = 256
-# Bits that one pass of the depth sort looks at; a GPU's items have less local memory for counters.
-_CPU_DIGIT, _GPU_DIGIT = 8, 4
+# Groups of a GPU: keys of the depth sort, and pairs, that one goes through at least; its items.
+_GPU_KEYS, _GPU_PAIRS, _GPU_GROUP = 2048, 512, 128
+# Bits that one pass of the depth sort looks at.
+_DIGIT = 8
+# Rows of a GPU's table of chunks that one item sums up.
+_BLOCK = 64
 # The chunks' histograms over tiles may have so many numbers for each entry of the lists.
 _TABLE_SHARE = 2
 
@@ -370,8 +334,9 @@ def tile_lists_bytes(n: int, m: int, *, tiles: int = 0) -> int:
     """
     # Splats: slots, offsets, keys and order twice, spans, ranks and owners (64), digits (1), sums
     # of scans. Entries: the lists (8) and the chunks' histograms, which have a row of all tiles at
-    # least.
-    return 66 * n + 8 * m + 4 * max(_TABLE_SHARE * m, tiles) + 5 * tiles + (1 << 14)
+    # least, and on GPUs the sums of blocks of them.
+    table = 4 * max(_TABLE_SHARE * m, tiles)
+    return 66 * n + 8 * m + table + table // _BLOCK + 9 * tiles + (1 << 14)
 
 
 def _checked_splats(
@@ -394,29 +359,29 @@ def _check_room(device: Device, splats: int, entries: int, tiles: Tiles) -> None
 
 def _longest_scan(device: Device, splats: int) -> int:
     """Most numbers of any scan by splats: of these, or of the digits of a radix pass."""
-    bits, chunks = _radix(device, splats)
-    return max(splats + 1, chunks << bits)
+    return max(splats + 1, _radix_chunks(device, splats) << _DIGIT)
 
 
 def _depth_order(
     device: Device, keys: DeviceArray, slots: DeviceArray, levels: Levels
 ) -> tuple[DeviceArray, DeviceArray | None]:
     """Sort the splats that have slots by key: their order (N, visible in front) and number."""
-    splats = keys.size
-    bits, chunks = _radix(device, splats)
+    splats, chunks = keys.size, _radix_chunks(device, keys.size)
     here = keys, device.empty(splats, np.int32)
     there = device.empty(splats, np.uint32), device.empty(splats, np.int32)
     if device.traits.is_cpu and chunks == 1:
         return _sorted_at_once(device, here, there, slots)
-    table = device.empty(chunks << bits, np.int32)
+    table = device.empty(chunks << _DIGIT, np.int32)
+    group = _group(device)
+    items = (chunks * group["GROUP"],) if group else (chunks,)
     # The first pass finds out how many are visible, and all later ones find the same.
     visible = None
-    for shift in range(0, _KEY_BITS, bits):
+    for shift in range(0, _KEY_BITS, _DIGIT):
         sizes = {"splats": splats, "chunks": chunks, "shift": shift}
-        macros = {"DIGIT_BITS": bits, "FIRST": shift == 0}
+        macros = {"DIGIT_BITS": _DIGIT, "FIRST": shift == 0, **group}
         device.launch(
-            "radix_count",
-            (chunks,),
+            for_kind(device, "radix_count"),
+            items,
             keys=here[0],
             slots=slots,
             visible=visible,
@@ -426,8 +391,8 @@ def _depth_order(
         )
         visible = exclusive_scan(device, table, table.size, levels)
         device.launch(
-            "radix_scatter",
-            (chunks,),
+            for_kind(device, "radix_scatter"),
+            items,
             keys=here[0],
             order=here[1],
             moved_keys=there[0],
@@ -464,10 +429,14 @@ def _sorted_at_once(
     return here[1], visible
 
 
-def _radix(device: Device, splats: int) -> tuple[int, int]:
-    """Bits of a digit, and chunks of the list."""
-    bits = _CPU_DIGIT if device.traits.is_cpu else _GPU_DIGIT
-    return bits, pieces(splats, run_length(device, splats, gpu=GPU_RUN))
+def _radix_chunks(device: Device, splats: int) -> int:
+    """Chunks that the depth sort cuts the list of splats into."""
+    return pieces(splats, run_length(device, splats, gpu=_GPU_KEYS))
+
+
+def _group(device: Device) -> dict[str, int]:
+    """The items of a group that shares a chunk; on a CPU one item has it."""
+    return {} if device.traits.is_cpu else {"GROUP": _GPU_GROUP}
 
 
 def _sort_by_tile(device: Device, counts: TileCounts) -> tuple[DeviceArray, DeviceArray]:
@@ -480,19 +449,41 @@ def _sort_by_tile(device: Device, counts: TileCounts) -> tuple[DeviceArray, Devi
     starts = device.empty(tiles + 1, np.int32)
     entries = device.empty((pairs, 2), np.int32)
     walk = {
-        **{name: getattr(counts, name) for name in ("ranks", "owners", "offsets")},
+        "ranks": counts.ranks,
+        "offsets": counts.offsets,
         "splats": len(counts.ranks),
         "pairs": pairs,
         "tiles_x": across,
         "first_tile_row": counts.tiles.first_row,
+        "table": table,
+        "chunks": chunks,
+        "tiles": tiles,
+        **_group(device),
     }
-    sizes = {"table": table, "chunks": chunks, "tiles": tiles}
+    items = (chunks * walk.get("GROUP", 1),)
+    owners = {"owners": counts.owners}
+    count = for_kind(device, "tile_histogram")
+    device.launch(count, items, **walk, **(owners if device.traits.is_cpu else {}))
+    _column_offsets(device, table, starts)
+    device.launch(
+        for_kind(device, "tile_scatter"), items, **walk, **owners, starts=starts, entries=entries
+    )
+    return entries, starts
+
+
+def _column_offsets(device: Device, table: DeviceArray, starts: DeviceArray) -> None:
+    """Replace a table's columns by the sums of the rows before; ``starts`` by those of all."""
+    chunks, tiles = table.shape
+    blocks = pieces(chunks, _BLOCK)
+    rows, by_block = table, {"table": table, "chunks": chunks, "tiles": tiles, "rows": _BLOCK}
+    if not device.traits.is_cpu and blocks > 1:
+        rows = device.empty((blocks, tiles), np.int32)
+        device.launch("tile_sums_gpu", (tiles, blocks), **by_block, sums=rows)
     run = run_length(device, tiles, gpu=1)
-    device.launch("tile_histogram", (chunks,), **walk, **sizes)
     runs = pieces(tiles, run)
-    by_tile = {"counts": starts, **sizes, "run": run}
-    device.launch("tile_offsets", (runs,), **by_tile, WHOLE=runs == 1)
+    by_tile = {"counts": starts, "chunks": len(rows), "tiles": tiles, "run": run}
+    device.launch("tile_offsets", (runs,), table=rows, **by_tile, WHOLE=runs == 1)
+    if rows is not table:
+        device.launch("tile_places_gpu", (tiles, blocks), **by_block, sums=rows)
     if runs > 1:
         exclusive_scan(device, starts, tiles + 1, scan_levels(device, tiles + 1))
-    device.launch("tile_scatter", (chunks,), **walk, starts=starts, entries=entries, **sizes)
-    return entries, starts

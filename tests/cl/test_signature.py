@@ -27,10 +27,12 @@ _VARIANTS = [
     ("splat_project_grad", {"COVARIANCES": 1, "DEFOCUS": 1}),
     ("splat_project_grad", {"VIEW_PARTS": 1}),
     ("hermite_project", {"MODAL": 1, "DEFOCUS": 1}),
-    ("scan_sum", {"WIDE": 1}),
+    ("scan_sum_cpu", {"WIDE": 1}),
+    ("scan_sum_gpu", {"WIDE": 1}),
     ("tile_count", {"WHOLE": 1}),
     ("tile_count", {"ELLIPSES": 1}),
-    ("scan_place", {"WIDE": 1}),
+    ("scan_place_cpu", {"WIDE": 1}),
+    ("scan_place_gpu", {"WIDE": 1}),
 ]
 
 

@@ -79,6 +79,29 @@ def test_more_views_than_one_run_of_tables(device, monkeypatch):
     assert np.array_equal(A.T(y), whole[1])
 
 
+@pytest.mark.parametrize("footprint", ["strip", "joseph"])
+@pytest.mark.parametrize("shape", [(130, 290), (3, 40, 70)])
+def test_columns_that_a_gpus_items_share(device, monkeypatch, shape, footprint):
+    """Items of wide images take several columns each; on a CPU nothing changes."""
+    scan = rift.Parallel(np.linspace(0, np.pi, 37, endpoint=False) + 0.1, bins=330)
+    plain = PhaseProjector(rift.Grid(shape), scan, footprint, device)
+    monkeypatch.setattr(projector, "_GPU_WIDE", 1)
+    shared = PhaseProjector(rift.Grid(shape), scan, footprint, device)
+    assert device.traits.is_cpu or shared._segment > plain._segment
+    random = np.random.default_rng(4)
+    x = random.standard_normal(plain.domain).astype(np.float32)
+    y = random.standard_normal(plain.range).astype(np.float32)
+    np.testing.assert_allclose(shared(x), plain(x), rtol=0, atol=3e-6 * np.abs(plain(x)).max())
+    assert np.array_equal(shared.T(y), plain.T(y))
+    assert rift.dot_test(shared) < 1e-6
+    whole = shared(x), shared.T(y)
+    monkeypatch.setattr(projector, "_TABLE_BYTES", {"cpu": 1, "gpu": 1})
+    monkeypatch.setattr(projector, "_FEWEST_VIEWS", 3)
+    in_runs = PhaseProjector(rift.Grid(shape), scan, footprint, device)
+    assert np.array_equal(in_runs(x), whole[0])
+    assert np.array_equal(in_runs.T(y), whole[1])
+
+
 def test_a_budget_too_small_for_one_slice_is_refused():
     A, x, _ = volume(rift.open_device(memory=10_000))
     with pytest.raises(ResourceLimitError, match=r"part of a slice .*9\.77 KiB"):

@@ -13,15 +13,11 @@ from hypothesis import strategies as st
 import rift_cl as rift
 from rift_cl.errors import DTypeError, InputError, ResourceLimitError, ShapeError
 from rift_cl.reference.tile_lists import tile_lists as twin
-from rift_cl.splat.tile_lists import (
-    Tiles,
-    scan_levels,
-    seen_slots,
-    tile_lists,
-    tile_lists_bytes,
-)
+from rift_cl.splat.prefix_sums import exclusive_scan, scan_levels
+from rift_cl.splat.tile_lists import Tiles, seen_slots, tile_lists, tile_lists_bytes
 
 MODULE = importlib.import_module("rift_cl.splat.tile_lists")
+SUMS = importlib.import_module("rift_cl.splat.prefix_sums")
 FIELDS = ("slots", "entries", "starts")
 BITS = st.integers(0, 2**32 - 1)
 TELLING = np.array(
@@ -86,11 +82,23 @@ def test_random_splats(device, splats, sort):
 @pytest.mark.parametrize("sort", [True, False])
 @pytest.mark.parametrize("least", [2, 3])
 def test_every_way_of_cutting_the_work(device, monkeypatch, least, sort):
-    for name in ("_CPU_LEAST", "GPU_RUN", "_GPU_PAIRS"):
+    for name in ("_GPU_KEYS", "_GPU_PAIRS", "_BLOCK"):
         monkeypatch.setattr(MODULE, name, least)
+    for name in ("_CPU_LEAST", "_GPU_RUN", "_GPU_ALONE"):
+        monkeypatch.setattr(SUMS, name, least)
     for splats in (1, 2, 5, 8, 9, 33, 70):
         boxes, depth = _scene(splats, tiles_x=4, tiles_y=3, seed=splats)
         _check(device, boxes, np.round(depth), tiles_x=4, tiles_y=3, sort=sort)
+
+
+@pytest.mark.parametrize("count", [1, 255, 256, 257, 4096, 4097, 16384, 16385, 70000])
+@pytest.mark.parametrize("wide", [False, True])
+def test_prefix_sums(device, count, wide):
+    numbers = np.random.default_rng(count).integers(-5, 9, count)
+    values = device.array(numbers.astype(np.int64 if wide else np.int32))
+    total = exclusive_scan(device, values, count, scan_levels(device, count), wide=wide)
+    assert device.get(total)[0] == numbers.sum()
+    assert np.array_equal(device.get(values), np.cumsum(numbers) - numbers)
 
 
 @pytest.mark.parametrize("sort", [True, False])

@@ -44,6 +44,8 @@ class Contender(ABC):
     name: str
     arrays = "NumPy"
     ours = False
+    # "CPU" or "GPU" for who works there alone, whatever the OpenCL device is.
+    place = ""
     operations: tuple[str, ...]
     # Runs of each operation in a round.
     repeats = 1
@@ -55,6 +57,11 @@ class Contender(ABC):
     @abstractmethod
     def prepared(self, operation: str) -> Callable[[], Any]:
         """A call that does an operation and nothing else, its inputs in place."""
+
+    @classmethod
+    def fits(cls, device: rift.Device) -> bool:
+        """Whether it works on that kind of device: on a GPU no race with what the CPU does."""
+        return cls.place in ("", "CPU" if device.traits.is_cpu else "GPU")
 
     def leave(self, array: Any) -> Floats:
         """Bring a result back."""

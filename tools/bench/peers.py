@@ -1,4 +1,4 @@
-"""The peers: ASTRA, silx, gratopy and scikit-image, and ours in scikit-image's place.
+"""The peers: ASTRA on CPU and GPU, silx, gratopy and scikit-image, and ours in the latter's place.
 
 Conventions, found by comparison with exact sinograms: ASTRA and silx let y grow upwards, which
 turns the sign of the angles; gratopy's detector runs the other way as well; scikit-image has its
@@ -24,7 +24,9 @@ from rift_cl import phantom
 class Astra(TomographyContender):
     """ASTRA's CPU algorithms, which use one thread."""
 
+    place = "CPU"
     projector: ClassVar[str]
+    ending: ClassVar[str] = ""
 
     def __init__(self, device: rift.Device, case: Case) -> None:
         super().__init__(device, case)
@@ -37,7 +39,7 @@ class Astra(TomographyContender):
         self._algorithms = {kind: self._algorithm(kind, projector) for kind in ("FP", "BP", "FBP")}
 
     def _algorithm(self, kind: str, projector: int) -> int:
-        settings = self._astra.astra_dict(kind)
+        settings = self._astra.astra_dict(kind + self.ending)
         image = "VolumeDataId" if kind == "FP" else "ReconstructionDataId"
         settings |= {"ProjectorId": projector, "ProjectionDataId": self._views, image: self._image}
         if kind == "FBP":
@@ -78,6 +80,72 @@ class AstraStrip(Astra):
     """Rays as wide as a bin, weighted by area."""
 
     name, projector = "ASTRA strip", "strip"
+
+
+class AstraGpu(Astra):
+    """ASTRA's CUDA algorithms on NumPy arrays, which it copies to the GPU and back."""
+
+    name, projector = "ASTRA, CUDA", "cuda"
+    place = "GPU"
+    ending = "_CUDA"
+    repeats = 3
+
+    def __init__(self, device: rift.Device, case: Case) -> None:
+        if not import_module("astra").use_cuda():
+            raise LeftOutError("ASTRA finds no CUDA device")
+        super().__init__(device, case)
+
+
+class AstraGpuTensors(TomographyContender):
+    """ASTRA's CUDA projectors of volumes, on torch's tensors that stay on the GPU."""
+
+    name = "ASTRA 3D, CUDA tensors"
+    arrays = "device"
+    place = "GPU"
+    operations = ("forward", "backward")
+    repeats = 3
+
+    def __init__(self, device: rift.Device, case: Case) -> None:
+        super().__init__(device, case)
+        astra = import_module("astra")
+        if not astra.use_cuda():
+            raise LeftOutError("ASTRA finds no CUDA device")
+        self._torch = import_module("torch")
+        self._direct = import_module("astra.experimental")
+        volume = astra.create_vol_geom(case.n, case.n, case.slices)
+        views = astra.create_proj_geom(
+            "parallel3d", 1.0, 1.0, case.slices, case.bins, -case.angles
+        )
+        self._projector = astra.create_projector("cuda3d", views, volume)
+        self._image = self._torch.zeros((case.slices, case.n, case.n), device="cuda")
+        self._views = self._torch.zeros((case.slices, case.views, case.bins), device="cuda")
+
+    def enter(self, array: Floats) -> Any:
+        """Copy to the GPU; its projections are (slice, view, bin), of one slice too."""
+        slices, views, bins = self._views.shape
+        if array.shape[-1] == bins:
+            array = array.reshape(views, slices, bins).swapaxes(0, 1)
+        tensor = self._torch.from_numpy(np.ascontiguousarray(array)).cuda()
+        return tensor.reshape(slices, *tensor.shape[-2:])
+
+    def leave(self, array: Any) -> Floats:
+        """Copy to the host, without the axis of a single slice."""
+        found: Floats = array.cpu().numpy()
+        if self.case.slices == 1:
+            return found[0]
+        return found.swapaxes(0, 1) if found.shape[-1] == self.case.bins else found
+
+    def forward(self, image: Any) -> Any:
+        """Project and wait for the result."""
+        self._direct.direct_FP3D(self._projector, image, self._views)
+        self._torch.cuda.synchronize()
+        return self._views
+
+    def backward(self, sinogram: Any) -> Any:
+        """Backproject and wait for the result."""
+        self._direct.direct_BP3D(self._projector, self._image, sinogram)
+        self._torch.cuda.synchronize()
+        return self._image
 
 
 class Silx(TomographyContender):
@@ -166,6 +234,7 @@ class ScikitImage(TomographyContender):
     """scikit-image, on the CPU; ``radon`` sees the disc alone, with n bins."""
 
     name = "scikit-image"
+    place = "CPU"
     module: ClassVar[str] = "skimage.transform"
 
     def __init__(self, device: rift.Device, case: Case) -> None:
@@ -205,6 +274,7 @@ class RiftAsScikitImage(ScikitImage):
     """Ours under scikit-image's names, NumPy in and out; it knows the default device alone."""
 
     name = "rift_cl, as scikit-image"
+    place = ""
     module = "rift_cl.interop.skimage"
     ours = True
     repeats = 3
@@ -221,8 +291,12 @@ PEERS: tuple[type[TomographyContender], ...] = (
     AstraLine,
     AstraLinear,
     AstraStrip,
+    AstraGpu,
+    AstraGpuTensors,
     Silx,
     Gratopy,
     ScikitImage,
     RiftAsScikitImage,
 )
+# Those that take stacks.
+STACK_PEERS: tuple[type[TomographyContender], ...] = (AstraGpuTensors,)

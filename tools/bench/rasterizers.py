@@ -1,4 +1,4 @@
-"""Who draws splats in the race: our renderer, and a tile rasterizer in plain torch.
+"""Who draws splats in the race: our renderer, gsplat on CUDA, and tiles in plain torch.
 
 Both start from parameters where they keep them and leave image and gradients there. The gradient
 is that of the sum of the image times white noise, by every parameter of the splats and by the
@@ -13,9 +13,11 @@ from contextlib import contextmanager
 from importlib import import_module
 from typing import Any
 
+import numpy as np
+
 import rift_cl as rift
 from bench.case import Floats
-from bench.contender import Contender, relative
+from bench.contender import Contender, LeftOutError, relative
 from bench.splats import SplatCase
 from rift_cl.splat import Renderer
 
@@ -81,10 +83,76 @@ class RiftRasterizer(Rasterizer):
         return self._renderer.forward(case.splats, case.camera, background=self._background)
 
 
+class Gsplat(Rasterizer):
+    """gsplat's CUDA kernels, tensors on the GPU in and out."""
+
+    name = "gsplat, CUDA"
+    arrays = "torch"
+    place = "GPU"
+    repeats = 3
+
+    def __init__(self, device: rift.Device, case: SplatCase) -> None:
+        super().__init__(device, case)
+        self._torch = torch = import_module("torch")
+        if not torch.cuda.is_available():
+            raise LeftOutError("torch finds no CUDA device")
+        self._rasterization = import_module("gsplat").rasterization
+
+        def leaf(array: Any) -> Any:
+            return torch.tensor(np.float32(array), device="cuda", requires_grad=True)
+
+        self._parameters = {name: leaf(array) for name, array in case.parameters.items()}
+        self._background = leaf(case.background)
+        with torch.no_grad():
+            self._grad_image = leaf(case.grad_image).detach()
+            self._view = leaf(case.camera.view).detach()[None]
+            self._K = leaf(case.camera.K).detach()[None]
+
+    def leave(self, array: Any) -> Floats:
+        """Copy to the host."""
+        found: Floats = array.detach().cpu().numpy()
+        return found
+
+    def draw(self) -> Any:
+        """Draw and wait for the image."""
+        with self._torch.no_grad():
+            image = self._image()
+        self._torch.cuda.synchronize()
+        return image
+
+    def draw_and_gradient(self) -> Any:
+        """Draw, differentiate and wait for the gradients."""
+        for leaf in (*self._parameters.values(), self._background):
+            leaf.grad = None
+        (self._image() * self._grad_image).sum().backward()
+        self._torch.cuda.synchronize()
+        return self._parameters["means"].grad
+
+    def _image(self) -> Any:
+        values = self._parameters
+        height, width = self.case.camera.size
+        image, _, _ = self._rasterization(
+            values["means"],
+            values["quats"],
+            values["scales"],
+            values["opacities"],
+            values["sh"],
+            self._view,
+            self._K,
+            width,
+            height,
+            sh_degree=3,
+            packed=False,
+            backgrounds=self._background[None],
+        )
+        return image[0]
+
+
 class TorchTiles(Rasterizer):
     """``bench.torch_tiles``, on as many threads as torch takes."""
 
     name = "torch tiles"
+    place = "CPU"
     arrays = "torch"
     threads: int | None = None
 
@@ -135,4 +203,9 @@ class TorchTilesAlone(TorchTiles):
     threads = 1
 
 
-RASTERIZERS: tuple[type[Rasterizer], ...] = (RiftRasterizer, TorchTiles, TorchTilesAlone)
+RASTERIZERS: tuple[type[Rasterizer], ...] = (
+    RiftRasterizer,
+    Gsplat,
+    TorchTiles,
+    TorchTilesAlone,
+)

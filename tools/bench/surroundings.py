@@ -15,7 +15,8 @@ from typing import Any
 import rift_cl as rift
 
 _OURS = ("numpy", "scipy", "pyopencl")
-_PACKAGES = (*_OURS, "astra-toolbox", "itk-rtk", "silx", "gratopy", "scikit-image", "torch")
+_PEERS = ("astra-toolbox", "itk-rtk", "silx", "gratopy", "scikit-image", "torch", "gsplat")
+_PACKAGES = (*_OURS, *_PEERS)
 _IMPORTS = 5
 
 

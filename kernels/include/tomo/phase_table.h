@@ -28,8 +28,15 @@
 #ifndef BLOCKS
 #define BLOCKS (LANES == 8 ? 8 : 1)
 #endif
-/* Columns that one work-item handles. */
-#define SEGMENT (LANES * BLOCKS)
+/* An item handles BLOCKS times LANES columns, STEP apart. A CPU's lie side by side. On a GPU other items
+ * take those between, so that the loads of neighbours are one, while each finds out once where a row
+ * starts: that is some forty operations, beside four for a column. */
+#ifndef STEP
+#define STEP LANES
+#endif
+/* Columns that STEP / LANES items handle together. */
+#define SEGMENT (STEP * BLOCKS)
+#define FIRST_COLUMN(item) ((item) / (STEP / LANES) * SEGMENT + (item) % (STEP / LANES) * LANES)
 
 /* What describes a pixel's shadow in a view, eight numbers: see footprint.h and shadow.h. */
 typedef struct {

@@ -35,6 +35,9 @@ _TABLE_BYTES = {"cpu": 4 << 20, "gpu": 64 << 20}
 _FEWEST_VIEWS = 16
 # A CPU reads tables the more often from its cache the more rows it takes in a run.
 _ROW_RUNS, _ITEMS_PER_UNIT = (64, 32, 16), 8
+# An item of a GPU has so many columns of images that are wide enough, with those of others between:
+# see ``kernels/include/tomo/phase_table.h``.
+_GPU_WIDE, _GPU_STEP, _GPU_BLOCKS = 512, 64, 4
 # Slices that are worked on together, which bounds the scratch memory of any volume.
 _SLAB = 16
 # Bytes of a view's records, besides the order of its rows.
@@ -80,11 +83,18 @@ class PhaseProjector(ParallelProjector, Projector):
         super().__init__(grid, scan, device, dtype)
         self.footprint = check_footprint(footprint)
         lanes = self.device.traits.macros["LANES"]
-        blocks = 32 // self.dtype.itemsize if lanes > 1 else 1
-        self._segment = lanes * blocks
+        step, blocks = lanes, 32 // self.dtype.itemsize if lanes > 1 else 1
+        if not self.device.traits.is_cpu and min(grid.shape[-2:]) >= _GPU_WIDE:
+            step, blocks = _GPU_STEP, _GPU_BLOCKS
+        self._segment, self._columns_of_item = step * blocks, lanes * blocks
         self._table_bytes = _TABLE_BYTES["cpu" if self.device.traits.is_cpu else "gpu"]
         self._precision = {"DOUBLE": int(self.dtype == np.float64)}
-        self._macros = {"BLOCKS": blocks, "LOG2_PHASES": LOG2_PHASES, **self._precision}
+        self._macros = {
+            "BLOCKS": blocks,
+            "STEP": step,
+            "LOG2_PHASES": LOG2_PHASES,
+            **self._precision,
+        }
 
     @cached_property
     def _tables(self) -> tuple[PhaseTable, PhaseTable]:
@@ -135,8 +145,8 @@ class PhaseProjector(ParallelProjector, Projector):
     ) -> None:
         table, (first, count) = walk.table, run
         entries = self.device.empty((slab.slices, count, table.entries), self.dtype)
-        segments = table.columns // self._segment
-        work = (count, segments) if self.device.traits.is_cpu else (segments, count)
+        items = table.columns // self._columns_of_item
+        work = (count, items) if self.device.traits.is_cpu else (items, count)
         self.device.launch(
             "radon_project",
             (*work, slab.slices),
@@ -203,7 +213,7 @@ class PhaseProjector(ParallelProjector, Projector):
             )
             self.device.launch(
                 "radon_backproject",
-                (table.padded // self._segment, -(-table.rows // rows), slab.slices),
+                (table.padded // self._columns_of_item, -(-table.rows // rows), slab.slices),
                 table=entries,
                 plane=plane,
                 geometry=walk.geometry,
@@ -323,6 +333,8 @@ class PhaseProjector(ParallelProjector, Projector):
         seen = scan.subset(np.arange(views.start, views.stop))
         part = PhaseProjector(grid, seen, self.footprint, self.device, self.dtype)
         part._table_bytes = 0
+        part._segment, part._columns_of_item = self._segment, self._columns_of_item
+        part._macros = self._macros
         by_rows, by_columns = self._tables
         part._tables = (
             by_rows.part(views, rows, slice(0, nx), self._segment),

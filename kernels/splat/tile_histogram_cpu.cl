@@ -9,7 +9,7 @@
 #include "include/portable.h"
 #include "include/splat/tile_walk.h"
 
-KERNEL void tile_histogram(
+KERNEL void tile_histogram_cpu(
     __global const int4 *restrict ranks, __global const int2 *restrict owners,
     __global const int *restrict offsets, __global int *restrict table, int splats, int pairs,
     int chunks, int tiles, int tiles_x, int first_tile_row)

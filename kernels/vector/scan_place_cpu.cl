@@ -23,7 +23,7 @@ typedef long number;
 typedef int number;
 #endif
 
-KERNEL void scan_place(
+KERNEL void scan_place_cpu(
     __global number *restrict values, __global long *restrict sums, int count, int run)
 {
   const long first = (long)get_global_id(0) * run;

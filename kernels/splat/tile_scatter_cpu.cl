@@ -14,7 +14,7 @@
 #include "include/portable.h"
 #include "include/splat/tile_walk.h"
 
-KERNEL void tile_scatter(
+KERNEL void tile_scatter_cpu(
     __global const int4 *restrict ranks, __global const int2 *restrict owners,
     __global const int *restrict offsets, __global int *restrict table, __global const int *restrict starts,
     __global int2 *restrict entries, int splats, int pairs, int chunks, int tiles, int tiles_x,

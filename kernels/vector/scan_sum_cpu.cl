@@ -1,4 +1,4 @@
-/* Sum runs of whole numbers: the way up of a prefix sum (the way down is scan_place).
+/* Sum runs of whole numbers: the way up of a prefix sum (the way down is scan_place_cpu).
  *
  *     sums[r] = sum of values[r * run] .. values[r * run + run - 1]
  *
@@ -19,7 +19,7 @@ typedef long number;
 typedef int number;
 #endif
 
-KERNEL void scan_sum(
+KERNEL void scan_sum_cpu(
     __global const number *restrict values, __global long *restrict sums, int count, int run)
 {
   const long first = (long)get_global_id(0) * run;
