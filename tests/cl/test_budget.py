@@ -115,7 +115,9 @@ def test_fixed_need_above_the_budget_is_refused():
 def traits(monkeypatch):
     monkeypatch.delenv("RIFT_MEMORY", raising=False)
     monkeypatch.setattr(budget, "free_host_memory", lambda: 1000)
-    return dataclasses.replace(rift.devices()[0].traits, memory=5000, is_cpu=True, unified=True)
+    return dataclasses.replace(
+        rift.devices()[0].traits, memory=5000, is_cpu=True, unified=True, share=1.0, address_bits=64
+    )
 
 
 def test_budget_is_the_smallest_of_what_limits_it(traits, monkeypatch):

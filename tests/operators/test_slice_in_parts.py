@@ -104,7 +104,7 @@ def test_a_slice_too_large_for_the_fourier_projector_is_refused_with_what_takes_
         rift.Parallel(np.linspace(0, 3, 40), 64),
         "FastProjector cannot .*rift.Projector can",
     )
-    for small in (limited(device, 200_000), limited(device, allocation=30_000)):
+    for small in (limited(device, 150_000), limited(device, allocation=30_000)):
         A = rift.FastProjector(rift.Grid((64, 64)), scan, device=small)
         for apply in (A, A.T):
             with pytest.raises(ResourceLimitError, match=words):

@@ -89,12 +89,8 @@ class PhaseProjector(ParallelProjector, Projector):
         self._segment, self._columns_of_item = step * blocks, lanes * blocks
         self._table_bytes = _TABLE_BYTES["cpu" if self.device.traits.is_cpu else "gpu"]
         self._precision = {"DOUBLE": int(self.dtype == np.float64)}
-        self._macros = {
-            "BLOCKS": blocks,
-            "STEP": step,
-            "LOG2_PHASES": LOG2_PHASES,
-            **self._precision,
-        }
+        self._macros = {"LOG2_PHASES": LOG2_PHASES, **self._precision}
+        self._layout = {"BLOCKS": blocks, "STEP": step, **self._macros}
 
     @cached_property
     def _tables(self) -> tuple[PhaseTable, PhaseTable]:
@@ -161,7 +157,7 @@ class PhaseProjector(ParallelProjector, Projector):
             columns=table.columns,
             rows=table.rows,
             width=table.width,
-            **self._macros,
+            **self._layout,
         )
         bins = 64 if self.device.traits.is_cpu else 1
         self.device.launch(
@@ -224,7 +220,7 @@ class PhaseProjector(ParallelProjector, Projector):
                 width=table.padded,
                 add=first > 0,
                 ROWS=rows,
-                **self._macros,
+                **self._layout,
             )
         return plane
 
@@ -334,7 +330,7 @@ class PhaseProjector(ParallelProjector, Projector):
         part = PhaseProjector(grid, seen, self.footprint, self.device, self.dtype)
         part._table_bytes = 0
         part._segment, part._columns_of_item = self._segment, self._columns_of_item
-        part._macros = self._macros
+        part._layout = self._layout
         by_rows, by_columns = self._tables
         part._tables = (
             by_rows.part(views, rows, slice(0, nx), self._segment),
