@@ -373,7 +373,7 @@ def _depth_order(
         return _sorted_at_once(device, here, there, slots)
     table = device.empty(chunks << _DIGIT, np.int32)
     group = _group(device)
-    items = (chunks * group["GROUP"],) if group else (chunks,)
+    items = (chunks * group.get("GROUP", 1),)
     # The first pass finds out how many are visible, and all later ones find the same.
     visible = None
     for shift in range(0, _KEY_BITS, _DIGIT):
@@ -458,16 +458,15 @@ def _sort_by_tile(device: Device, counts: TileCounts) -> tuple[DeviceArray, Devi
         "table": table,
         "chunks": chunks,
         "tiles": tiles,
-        **_group(device),
     }
-    items = (chunks * walk.get("GROUP", 1),)
-    owners = {"owners": counts.owners}
-    count = for_kind(device, "tile_histogram")
-    device.launch(count, items, **walk, **(owners if device.traits.is_cpu else {}))
+    group, owners = _group(device), {"owners": counts.owners}
+    items = (chunks * group.get("GROUP", 1),)
+    # On a CPU both kernels walk alike, and are given alike.
+    counted = owners if device.traits.is_cpu else {}
+    device.launch(for_kind(device, "tile_histogram"), items, **walk, **counted, **group)
     _column_offsets(device, table, starts)
-    device.launch(
-        for_kind(device, "tile_scatter"), items, **walk, **owners, starts=starts, entries=entries
-    )
+    lists = {**owners, "starts": starts, "entries": entries}
+    device.launch(for_kind(device, "tile_scatter"), items, **walk, **lists, **group)
     return entries, starts
 
 

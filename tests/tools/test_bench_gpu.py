@@ -51,6 +51,11 @@ def test_part_that_says_nothing_is_given_up_and_told(bench, tmp_path, monkeypatc
     assert found["status"] != 0
 
 
+def test_parts_that_are_asked_for_alone(bench, tmp_path):
+    assert bench.main(bench.Options(tmp_path / "new", only=("families",))) == 0
+    assert list(json.loads((tmp_path / "new.json").read_text())["parts"]) == ["families"]
+
+
 def test_no_such_device_is_told(bench, tmp_path):
     assert bench.main(bench.Options(tmp_path / "new", device="no such device"))
     assert not list(tmp_path.iterdir())

@@ -12,6 +12,7 @@ import os
 import subprocess
 import sys
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -245,3 +246,18 @@ def test_peer_that_cannot_be_made_is_skipped_with_the_reason(tool):
     assert entries == []
     assert "No module named 'missing'" in skipped["missing"]
     assert skipped["broken"] == "RuntimeError: it broke"
+
+
+def test_a_gpu_races_with_those_that_use_one(tool, monkeypatch):
+    peers, rasterizers = tool("bench.peers"), tool("bench.rasterizers")
+    cpu, gpu = SimpleNamespace(is_cpu=True), SimpleNamespace(is_cpu=False)
+    for every, on_gpu in ((peers.PEERS, "ASTRA, CUDA"), (rasterizers.RASTERIZERS, "gsplat, CUDA")):
+        kinds = {
+            traits.is_cpu: {
+                kind.name for kind in every if kind.fits(SimpleNamespace(traits=traits))
+            }
+            for traits in (cpu, gpu)
+        }
+        assert on_gpu in kinds[False] - kinds[True]
+        assert kinds[True] - kinds[False], "those of the CPU alone"
+        assert kinds[True] & kinds[False], "ours, and peers on OpenCL"

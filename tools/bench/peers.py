@@ -113,9 +113,7 @@ class AstraGpuTensors(TomographyContender):
         self._torch = import_module("torch")
         self._direct = import_module("astra.experimental")
         volume = astra.create_vol_geom(case.n, case.n, case.slices)
-        views = astra.create_proj_geom(
-            "parallel3d", 1.0, 1.0, case.slices, case.bins, case.angles
-        )
+        views = astra.create_proj_geom("parallel3d", 1.0, 1.0, case.slices, case.bins, case.angles)
         self._projector = astra.create_projector("cuda3d", views, volume)
         self._image = self._torch.zeros((case.slices, case.n, case.n), device="cuda")
         self._views = self._torch.zeros((case.slices, case.views, case.bins), device="cuda")
