@@ -222,7 +222,7 @@ def test_a_run_killed_in_its_last_write_keeps_its_frames(scene, tmp_path, monkey
     assert {path: path.stat().st_mtime_ns for path in frames} == frames
 
 
-@pytest.mark.parametrize("name", ["film.webm", "slices.TIF"])
+@pytest.mark.parametrize("name", ["film.webm", "slices.TIF", "brain.nii.gz"])
 def test_a_folder_that_is_called_as_a_file_is_refused(tmp_path, name):
     with pytest.raises(OutputError, match=f"{name}: ends as a file .* --out {name[:4]}"):
         RunFolder(tmp_path / name, "render")

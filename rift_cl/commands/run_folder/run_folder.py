@@ -45,7 +45,7 @@ _FREE = (
 _OF_FILES = (
     *(".gif", ".jpeg", ".jpg", ".mov", ".mp4", ".png", ".webm", ".webp"),
     *(".csv", ".glb", ".h5", ".hdf5", ".html", ".json", ".nii", ".npy", ".npz", ".obj", ".pdf"),
-    *(".ply", ".raw", ".spz", ".tif", ".tiff", ".vti", ".zip"),
+    *(".nii.gz", ".ply", ".raw", ".spz", ".tif", ".tiff", ".vti", ".zip"),
 )
 
 
@@ -83,10 +83,12 @@ class RunFolder:
         self._read = None if settings is None else _stamps(settings, path)
         self._overwrite = overwrite
         self._seen = self._config_stamp()
-        if path.suffix.lower() in _OF_FILES and not path.is_dir():
+        ending = next((each for each in _OF_FILES if path.name.lower().endswith(each)), "")
+        stem = path.name[: len(path.name) - len(ending)]
+        if ending and stem and not path.is_dir():
             raise OutputError(
                 f"{path}: ends as a file does, and is to be the folder of all that a run writes; "
-                f"name one, such as --out {path.stem}"
+                f"name one, such as --out {stem}"
             )
         above = next(parent for parent in path.absolute().parents if parent.exists())
         if not above.is_dir():
