@@ -38,7 +38,7 @@ from rift_cl.geometry.scan_value import (
 from rift_cl.geometry.vectors import Vectors
 
 
-@dataclass(frozen=True, init=False, eq=False)
+@dataclass(frozen=True, init=False, eq=False, repr=False)
 class Cone(ScanValue):
     """A cone-beam scan of a volume: a circle, or with heights a helix or steps.
 

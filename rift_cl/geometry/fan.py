@@ -75,7 +75,7 @@ class FanBeam:
         return fan_angles(count, self.center, self.pitch, self.source_to_detector)
 
 
-@dataclass(frozen=True, init=False, eq=False)
+@dataclass(frozen=True, init=False, eq=False, repr=False)
 class Fan(ScanValue):
     """A fan-beam scan of a slice, or of every slice of a volume in the same way.
 

@@ -22,7 +22,7 @@ from rift_cl.geometry.scan_value import (
 )
 
 
-@dataclass(frozen=True, init=False, eq=False)
+@dataclass(frozen=True, init=False, eq=False, repr=False)
 class Parallel(ScanValue):
     """A parallel-beam scan; on a volume every slice is looked at in the same way.
 

@@ -31,6 +31,9 @@ _ROUND_BEYOND = 4 * np.pi
 _ROUND_STEP = 0.25
 _FEWEST_ROUND = 8
 
+# Arrays of so many numbers are told in full.
+_FEW_NUMBERS = 4
+
 # Angles that scans hold, by identity. A few of them may look like degrees, which all did not.
 _held_angles: weakref.WeakValueDictionary[int, NDArray[np.float64]] = weakref.WeakValueDictionary()
 
@@ -51,6 +54,10 @@ class ScanValue:
     def __hash__(self) -> int:
         """Equal scans hash equally."""
         return hash(self._key())
+
+    def __repr__(self) -> str:
+        told = (f"{each.name}={_told(getattr(self, each.name))}" for each in fields(self))
+        return f"{type(self).__name__}({', '.join(told)})"
 
     @property
     def digest(self) -> str:
@@ -109,6 +116,17 @@ class ScanValue:
         return tuple(
             value.tobytes() if isinstance(value, np.ndarray) else value for value in self._values()
         )
+
+
+def _told(value: Any) -> str:
+    """A field in a few words, for an array may have thousands of numbers."""
+    if not isinstance(value, np.ndarray):
+        return repr(value)
+    if value.size <= _FEW_NUMBERS:
+        return str(value.tolist())
+    if value.ndim > 1:
+        return f"<{' x '.join(map(str, value.shape))} numbers>"
+    return f"<{value.size} numbers from {value[0]:.6g} to {value[-1]:.6g}>"
 
 
 def _restored(kind: type[Any], values: tuple[Any, ...]) -> Any:

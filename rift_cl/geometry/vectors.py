@@ -25,7 +25,7 @@ from rift_cl.geometry.scan_value import ScanValue, checked_count
 _FLAT = 1e-6
 
 
-@dataclass(frozen=True, init=False, eq=False)
+@dataclass(frozen=True, init=False, eq=False, repr=False)
 class Vectors(ScanValue):
     """Source and flat detector of every view of a scan.
 

@@ -213,3 +213,15 @@ def test_what_is_taken_from_accepted_angles_is_not_refused_as_degrees(kind, othe
             assert scan.scaled(2.0).views == scan.views
             with pytest.raises(ValueError, match="read-only"):
                 scan.angles[0] = 1
+
+
+def test_repr_of_many_views_is_one_line():
+    scan = Parallel(np.linspace(0, 3.1, 180), 256, pitch=0.5)
+    assert repr(scan) == (
+        "Parallel(angles=<180 numbers from 0 to 3.1>, bins=256, pitch=0.5, center=127.5)"
+    )
+    assert "angles=[0.0, 1.5]" in repr(Parallel([0, 1.5], 8))
+    turn = np.linspace(0, 6.2, 90)
+    vectors = Cone(turn, 8, 9, 0.1, source_to_axis=50, source_to_detector=99).vectors()
+    assert "source=<90 x 3 numbers>, " in repr(vectors)
+    assert "\n" not in repr(vectors)
