@@ -7,6 +7,7 @@ What a solver of least squares wants for a penalty of one's own, or for two scan
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -21,11 +22,12 @@ from rift_cl.operators.composite import Composite
 from rift_cl.operators.linear import LinearOperator, Shape
 
 
-def vstack(*operators: LinearOperator) -> Stack:
+def vstack(*operators: LinearOperator | Sequence[LinearOperator]) -> Stack:
     """Stack operators of one domain; ``vstack(A.T, B.T).T`` puts two of one range side by side.
 
     Args:
-        *operators: two or more, of one domain, type and device.
+        *operators: two or more, of one domain, type and device; or one sequence of them, as
+            ``numpy.vstack`` and ``scipy.sparse.vstack`` take.
 
     Returns:
         The operator from their domain to all results behind each other: along the first axis where
@@ -38,7 +40,10 @@ def vstack(*operators: LinearOperator) -> Stack:
         DTypeError: their types differ.
         DeviceError: they are on two devices.
     """
-    return Stack(*operators)
+    match operators:
+        case [list() | tuple() as together]:
+            return Stack(*together)
+    return Stack(*operators)  # type: ignore[arg-type]  # what is none, Stack names
 
 
 class Stack(Composite):

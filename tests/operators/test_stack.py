@@ -57,6 +57,13 @@ def test_results_of_one_detector_stand_along_the_first_axis(A, B, device):
     assert rift.dot_test(both) < 1e-6
 
 
+def test_a_list_of_operators_is_stacked_as_numpy_stacks_arrays(A, B):
+    assert np.array_equal(vstack([A, B])(X), vstack(A, B)(X))
+    assert np.array_equal(vstack((A, B))(X), vstack(A, B)(X))
+    with pytest.raises(InputError, match="wanted two or more"):
+        vstack([A])
+
+
 def test_results_of_other_shapes_are_flat(A, G):
     both = vstack(A, G)
     assert both.range == (8 * 21 + 180,)
