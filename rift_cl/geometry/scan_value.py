@@ -56,8 +56,9 @@ class ScanValue:
         return hash(self._key())
 
     def __repr__(self) -> str:
-        told = (f"{each.name}={_told(getattr(self, each.name))}" for each in fields(self))
-        return f"{type(self).__name__}({', '.join(told)})"
+        names = (field.name for field in fields(self))  # type: ignore[arg-type]
+        told = ", ".join(f"{name}={_told(getattr(self, name))}" for name in names)
+        return f"{type(self).__name__}({told})"
 
     @property
     def digest(self) -> str:
