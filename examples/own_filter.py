@@ -12,8 +12,8 @@ import rift_cl as rift
 
 
 def butterworth(frequency):
-    """The ramp, rolled off at half the Nyquist frequency; frequencies are in cycles per length."""
-    return frequency / (1 + (frequency / 0.25) ** 8)
+    """The ramp, rolled off at half the detector's Nyquist frequency, the largest that comes."""
+    return frequency / (1 + (frequency / frequency.max() / 0.5) ** 8)
 
 
 rift.register_filter("butterworth", butterworth)

@@ -91,13 +91,16 @@ def bounds(
         macros: those of this variant.
 
     Raises:
-        ValueError: a shape cannot be read, or has a name that is neither macro nor number.
+        ValueError: a buffer has no shape, or one that cannot be read or has a name that is neither
+            macro nor number.
     """
     known = {name: place for place, name in enumerate((*names, *AXES))}
     known = {name: place for name, place in known.items() if place not in buffers}
     found = list[Bound]()
     for buffer in buffers:
-        shape = shapes.get(names[buffer], _UNKNOWN)
+        if names[buffer] not in shapes:
+            raise ValueError(f"the comment that opens it has no shape of buffer {names[buffer]!r}")
+        shape = shapes[names[buffer]]
         if shape != _UNKNOWN:
             expression = _Expression(macros.expanded(shape), known)
             found.append(Bound(buffer, shape, tuple(expression.uses), expression.least))

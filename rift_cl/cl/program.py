@@ -29,7 +29,7 @@ from rift_cl.cl.launch_times import LaunchTimes
 from rift_cl.cl.process import claim_process
 from rift_cl.cl.signature import Arguments, Signature, check_numbers, signature
 from rift_cl.cl.watchdog import in_driver
-from rift_cl.errors import DeviceError, KernelArgumentError
+from rift_cl.errors import DeviceError, KernelArgumentError, KernelBuildError
 from rift_cl.progress import BUILDS
 
 if TYPE_CHECKING:
@@ -246,7 +246,7 @@ class Programs:
         name, macros = key
         program = self._builder.program(key)
         with building, named_errors(f"loading kernel {name}", self._device.name):
-            found = signature(name, kernel_source(name), self._builder.defines(macros))
+            found = self._signature(name, macros)
             handle = self._handle(program, name, found)
             needs = kernel_needs(handle, self._device._handle)
         fault = self._fault(needs, group)
@@ -258,6 +258,12 @@ class Programs:
             raise DeviceError(f"{feature_of(name)}: {fault}: use another device (--device)")
         smaller = {**dict(macros), _GROUP: str(group // 2)}
         return self._built((name, tuple(sorted(smaller.items()))), group // 2)
+
+    def _signature(self, name: str, macros: Any) -> Signature:
+        try:
+            return signature(name, kernel_source(name), self._builder.defines(macros))
+        except ValueError as error:
+            raise KernelBuildError(f"kernel {name}: {error}") from error
 
     def _handle(self, program: Any, name: str, taken: Signature) -> Any:
         import pyopencl as cl

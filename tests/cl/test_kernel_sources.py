@@ -229,3 +229,26 @@ def test_macros_reach_the_kernel_with_their_type(device, kernels):
     for value, wanted in ((3, 1.0), (3.0, 1.5), (np.float32(3), 1.5), (np.int64(3), 1.0)):
         device.launch("probe", (1,), p=target, VALUE=value)
         assert device.get(target)[0] == wanted, value
+
+
+def test_two_kernels_of_one_name_are_refused(kernels):
+    shutil.copy(kernels / "vector" / "axpby.cl", kernels / "train" / "axpby.cl")
+    with pytest.raises(KernelBuildError, match=r"two .* axpby, in train/axpby\.cl and vector/axp"):
+        source.kernel_source("axpby")
+
+
+def test_a_misspelt_kernel_is_told_the_near_one():
+    with pytest.raises(KernelBuildError, match="no kernel is called axpbi; did you mean axpby"):
+        source.kernel_source("axpbi")
+
+
+@pytest.mark.parametrize("there", ["x[size].", "y[size]"])
+def test_a_buffer_without_a_shape_is_refused(kernels, device, there):
+    """Its length could not be looked after, and a launch might overrun it."""
+    path = kernels / "vector" / "clip_negative.cl"
+    text = path.read_text(encoding="utf-8")
+    path.write_text(re.sub(r"Buffers: [^*]*\*/", f"Buffers: {there} */", text), encoding="utf-8")
+    fresh = Device(device._handle, device.selector, traits=device.traits)
+    y = fresh.zeros(8)
+    with pytest.raises(KernelBuildError, match=r"kernel clip_negative: .*shape"):
+        fresh.launch("clip_negative", (1,), y=y, size=8, RUN=8, DOUBLE=0)

@@ -181,12 +181,15 @@ def test_filters_are_taken_as_they_are():
 
 
 def test_a_filter_of_ones_own_has_a_name(device):
-    register_filter("own", np.sqrt)
+    def soft(frequency):
+        return frequency / (1 + frequency)
+
+    register_filter("own", soft)
     try:
-        assert np.array_equal(as_filter("own").taps(9, 0.5), Response(np.sqrt).taps(9, 0.5))
+        assert np.array_equal(as_filter("own").taps(9, 0.5), Response(soft).taps(9, 0.5))
         A = Projector(Grid((8, 8)), Parallel(np.arange(6.0), 13), device=device)
         y = white(6, 13)
-        assert np.array_equal(fbp(A, y, "own"), fbp(A, y, np.sqrt))
+        assert np.array_equal(fbp(A, y, "own"), fbp(A, y, soft))
         for name in ("own", "hann"):
             with pytest.raises(InputError, match=f"{name}.*already"):
                 register_filter(name, np.sqrt)
@@ -231,6 +234,8 @@ def test_exponents_without_a_meaning_are_refused(exponent):
         lambda f: 1.0,
         lambda f: np.where(f > 0.1, np.nan, f),
         lambda f: f * np.inf,
+        lambda f: f * 1e40,
+        lambda f, cutoff: f,
         lambda f: 1j * f,
         lambda f: ["a"] * len(f),
         lambda f: None,
@@ -239,6 +244,31 @@ def test_exponents_without_a_meaning_are_refused(exponent):
 def test_responses_that_are_no_finite_numbers_are_refused(function):
     with pytest.raises(InputError, match="response"):
         Response(function).taps(10, 1.0)
+
+
+@pytest.mark.parametrize(
+    ("function", "said"),
+    [
+        (lambda f: f / (1 + (f / 0.3) ** 8), "keeps 0.00.* % of the ramp .* cycles per bin"),
+        (lambda f: 1 / (1 + f), "times the ramp"),
+        (lambda f: -f, "is -1 times the ramp"),
+        (np.zeros_like, "keeps 0 % of the ramp"),
+    ],
+)
+def test_responses_that_are_no_ramp_are_doubted(device, function, said):
+    """Bins of 0.01: the first of these was written for bins of 1."""
+    A = Projector(Grid((8, 8), 0.01), Parallel(np.arange(6.0), 13, pitch=0.01), device=device)
+    with pytest.warns(UserWarning, match=said):
+        fbp(A, white(6, 13), function)
+
+
+def test_ramps_of_ones_own_are_not_doubted(device, recwarn):
+    A = Projector(Grid((8, 8), 0.01), Parallel(np.arange(6.0), 13, pitch=0.01), device=device)
+    for function in (lambda f: f, lambda f: f * np.cos(f / f.max()), lambda f: 0.7 * f * (f < 9)):
+        fbp(A, white(6, 13), function)
+    fbp(A, white(6, 13), "high-pass")
+    fbp(A, white(6, 13), HighPass(0.3))
+    assert not [str(each.message) for each in recwarn if "ramp" in str(each.message)]
 
 
 @pytest.mark.parametrize("gains", [[1, 2], np.ones((3, 1)), 1.0])

@@ -129,6 +129,7 @@ WRONG_LOSSES = {
     "wrongsign": (PixelLoss("d * d", "-2 * d * m"), "the gradient is .* and the slope"),
     "nothing": (PixelLoss("1.0f", "0.0f"), "0 everywhere"),
     "root": (PixelLoss("sqrt(d)", "0.5f * m / sqrt(d)"), "wanted finite numbers"),
+    "flat": (PixelLoss("sqrt(d * d)", "m * d / sqrt(d * d)"), "at d = 0 .* wanted finite numbers"),
     "halves": (PixelLoss("fabs(d)", "m * (d > 0 ? 1 : -1)"), "does not compile; d and m are vec"),
     "open": (PixelLoss("sqrt(d * d", "d"), "does not compile: .*expected"),
 }

@@ -10,6 +10,7 @@ expanded text is the whole truth about a kernel, which makes any cache keyed by 
 from __future__ import annotations
 
 import re
+from difflib import get_close_matches
 from functools import cache
 from pathlib import Path
 
@@ -47,9 +48,14 @@ def kernel_room(name: str) -> str:
 def kernel_source(name: str) -> str:
     """The source of one kernel with its includes in line."""
     folder = kernel_folder()
-    found = sorted(folder.rglob(f"{name}.cl"))
-    file = found[0].relative_to(folder).as_posix() if found else f"{name}.cl"
-    return "\n".join(_expand(file, set()))
+    found = [path.relative_to(folder).as_posix() for path in sorted(folder.rglob(f"{name}.cl"))]
+    if len(found) > 1:
+        raise KernelBuildError(
+            f"two kernels are called {name}, in {' and '.join(found)}: give one another name"
+        )
+    if not found and (near := get_close_matches(name, kernel_names(), 1)):
+        raise KernelBuildError(f"no kernel is called {name}; did you mean {near[0]}?")
+    return "\n".join(_expand(found[0] if found else f"{name}.cl", set()))
 
 
 def fault_place(name: str, log: str) -> str:

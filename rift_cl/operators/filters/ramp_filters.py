@@ -47,6 +47,9 @@ WINDOWS: dict[str, Callable[[Floats], Floats]] = {
 HIGH_PASS = "high-pass"
 # A response that is no ramp is sampled this many times finer than the detector can tell apart.
 _OVERSAMPLING = 16
+# A response that keeps less than such a part of the ramp, or differs from it by more than such a
+# factor where both begin, is hardly meant so.
+_LEAST_OF_RAMP, _LEVEL = 1e-3, 2.0
 
 
 @runtime_checkable
@@ -129,7 +132,8 @@ class Response:
 
     Args:
         function: the response (1 / length, as the ramp's is) at frequencies given in cycles per
-            unit of length, an array of them at a time, from 0 to the detector's Nyquist.
+            unit of length, an array of them at a time, from 0 to the detector's Nyquist: a share
+            of that is ``f / f.max()``.
     """
 
     function: Callable[[Floats], ArrayLike]
@@ -139,14 +143,65 @@ class Response:
         from scipy.fft import dct
 
         count = _OVERSAMPLING * bins
-        width = 0.5 / pitch / count
-        frequencies: Floats = (np.arange(count, dtype=np.float64) + 0.5) * width
-        values = np.asarray(self.function(frequencies))
-        real = values.dtype.kind in "fiub" and values.shape == frequencies.shape
-        if not real or not np.isfinite(values).all():
-            raise InputError("filter response must give one finite number for each frequency")
-        kernel = width * dct(values.astype(np.float64), type=2)[:bins]
+        frequencies = self._frequencies(bins, pitch)
+        kernel = 0.5 / pitch / count * dct(self._values(frequencies), type=2)[:bins]
         return np.concatenate([kernel[:0:-1], kernel])
+
+    def doubt(self, bins: int, pitch: float) -> str | None:
+        """Why an image would not have the object's values, in a sentence; None where it may.
+
+        Where the response falls short of the ramp at the lowest frequencies, levels are wrong;
+        where it keeps next to nothing of the ramp, its frequencies were meant in another unit.
+        """
+        frequencies = self._frequencies(bins, pitch)
+        ratios = self._values(frequencies) / frequencies
+        kept = float(np.sum(np.abs(ratios) * frequencies) / np.sum(frequencies))
+        if kept < _LEAST_OF_RAMP:
+            return (
+                f"filter {self._name} keeps {100 * kept:.2g} % of the ramp up to the detector's "
+                f"Nyquist frequency, {0.5 / pitch:.4g} cycles per unit of length: are its "
+                "frequencies meant in cycles per bin?"
+            )
+        level = float(np.median(ratios[:_OVERSAMPLING]))
+        if not 1 / _LEVEL <= level <= _LEVEL:
+            return (
+                f"filter {self._name} is {level:.3g} times the ramp |f| at the lowest frequencies: "
+                "values will not be the object's"
+            )
+        return None
+
+    @property
+    def _name(self) -> str:
+        return repr(getattr(self.function, "__name__", type(self.function).__name__))
+
+    @staticmethod
+    def _frequencies(bins: int, pitch: float) -> Floats:
+        count = _OVERSAMPLING * bins
+        middles: Floats = (np.arange(count, dtype=np.float64) + 0.5) * (0.5 / pitch / count)
+        return middles
+
+    def _values(self, frequencies: Floats) -> Floats:
+        try:
+            values = np.asarray(self.function(frequencies))
+        except TypeError as error:
+            raise InputError(
+                f"filter {self._name}: its response cannot be called with an array of frequencies "
+                f"alone ({error})"
+            ) from error
+        wanted = f"wanted one finite number for each of the {len(frequencies)} frequencies"
+        if values.dtype.kind not in "fiub" or values.shape != frequencies.shape:
+            raise InputError(
+                f"filter {self._name}: its response is of type {values.dtype} and shape "
+                f"{values.shape}, {wanted}"
+            )
+        bad = ~(np.abs(values) <= np.finfo(np.float32).max)
+        if bad.any():
+            at = int(np.argmax(bad))
+            raise InputError(
+                f"filter {self._name}: its response is {values[at]:.4g} at {frequencies[at]:.4g} "
+                f"cycles per unit of length, {wanted}"
+            )
+        return values.astype(np.float64)
 
 
 @dataclass(frozen=True)

@@ -13,6 +13,7 @@ each view gets a filter of its own (rift_cl/operators/filters/compensation.py).
 from __future__ import annotations
 
 import math
+import warnings
 from collections.abc import Iterable, Iterator
 from functools import partial
 from typing import Any
@@ -27,7 +28,13 @@ from rift_cl.geometry.seen_grid import scan_lengths
 from rift_cl.operators.algebra import Scaled
 from rift_cl.operators.composite import Composite
 from rift_cl.operators.filters.compensation import Compensation
-from rift_cl.operators.filters.ramp_filters import FilterLike, Gains, ViewFilter, as_filter
+from rift_cl.operators.filters.ramp_filters import (
+    FilterLike,
+    Gains,
+    Response,
+    ViewFilter,
+    as_filter,
+)
 from rift_cl.operators.linear import Chunk
 from rift_cl.operators.projector.parallel.parallel_projector import ParallelProjector
 from rift_cl.operators.projector.projector import Projector
@@ -79,9 +86,12 @@ class FilteredBackprojection(Composite):
         size = object_diameter(A) if diameter is None else one_number(diameter)
         if not size > 0:
             raise InputError(f"diameter is {diameter!r}, wanted the object's, a positive length")
+        chosen = as_filter(filter)
+        if isinstance(chosen, Response) and (doubt := chosen.doubt(A.scan.bins, A.scan.pitch)):
+            warnings.warn(doubt, stacklevel=2)
         self._filter = ViewFilter(
             A.scan,
-            as_filter(filter),
+            chosen,
             rows=A.range[1] if len(A.range) == 3 else None,
             gains=_scaled(view_gains(A.scan.angles, compensate, size), _unspread(A)),
             device=A.device,

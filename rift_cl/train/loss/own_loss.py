@@ -22,6 +22,7 @@ _RELATIVE, _ABSOLUTE = 0.03, 0.01
 # How many of the slopes may differ: a loss may have edges.
 _EDGES = 2
 
+_SUFFIX = "; numbers want an f behind them, so write 1e-4f, and not 1e-4"
 _VECTORS = (
     "; d and m are vectors on this device, so write m * sign(d), and not m * (d > 0 ? 1 : -1)"
 )
@@ -38,21 +39,22 @@ def check_own_loss(device: Device, name: str) -> None:
         return
     loss = PIXEL_LOSSES[name]
     try:
-        found = [_evaluated(device, name, float(at)) for at in _AT]
+        found = [_evaluated(device, name, float(at)) for at in (*_AT, 0.0)]
         either = [[_evaluated(device, name, float(at + s * _STEP))[0] for s in (1, -1)]
                   for at in _AT]  # fmt: skip
     except KernelBuildError as error:
         reason = str(error).splitlines()[-1]
-        vectors = _VECTORS if "vector" in reason else ""
-        raise InputError(f"pixel loss {name!r} does not compile{vectors}: {reason}") from error
+        hint = _SUFFIX if "double" in reason else _VECTORS if "vector" in reason else ""
+        raise InputError(f"pixel loss {name!r} does not compile{hint}: {reason}") from error
     values, slopes = np.array(found).T
     bad = ~(np.isfinite(values) & np.isfinite(slopes))
     if bad.any():
         at = np.flatnonzero(bad)[0]
         raise InputError(
-            f"pixel loss {name!r}: at d = {_AT[at]:g} the value is {values[at]:.4g} and the "
+            f"pixel loss {name!r}: at d = {[*_AT, 0][at]:g} the value is {values[at]:.4g} and the "
             f"gradient {slopes[at]:.4g}, wanted finite numbers"
         )
+    values, slopes = values[:-1], slopes[:-1]
     if not slopes.any():
         raise InputError(f"pixel loss {name!r}: its gradient is 0 everywhere, nothing would be fit")
     differences = -np.diff(np.array(either), axis=1)[:, 0] / (2 * _STEP)
