@@ -6,6 +6,7 @@ and the environment variable ``RIFT_LOAD`` hands it on to processes that the com
 
 from __future__ import annotations
 
+import hashlib
 import importlib.util
 import os
 import sys
@@ -18,6 +19,7 @@ from rift_cl.errors import InputError
 VARIABLE = "RIFT_LOAD"
 # Before the name of the file, which may be that of a package.
 _PREFIX = "rift_own_"
+_DIGITS = 12
 
 
 def load_parts(paths: Sequence[str] = ()) -> None:
@@ -35,6 +37,21 @@ def load_parts(paths: Sequence[str] = ()) -> None:
         _load(file)
     if files:
         os.environ[VARIABLE] = os.pathsep.join(map(str, files))
+
+
+def loaded_parts() -> dict[str, str]:
+    """The files that were run, by name, with the first digits of their SHA-256 as they are now.
+
+    A run is repeated, and gone on with, by the names of the parts that it used; these tell whether
+    a name still means the same.
+    """
+    files = [Path(str(module.__file__)) for name, module in sorted(sys.modules.items())
+             if name.startswith(_PREFIX)]  # fmt: skip
+    return {
+        file.name: hashlib.sha256(file.read_bytes()).hexdigest()[:_DIGITS]
+        for file in files
+        if file.is_file()
+    }
 
 
 def _load(file: Path) -> None:

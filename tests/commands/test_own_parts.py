@@ -8,10 +8,11 @@ import pytest
 
 import rift_cl as rift
 from rift_cl.commands.cli import main
-from rift_cl.errors import InputError
+from rift_cl.commands.reconstruct.settings import ReconstructSettings
+from rift_cl.errors import CheckpointError, InputError
 from rift_cl.io.volumes import read_volume
 from rift_cl.operators import FILTERS
-from rift_cl.own_parts import VARIABLE, load_parts
+from rift_cl.own_parts import VARIABLE, load_parts, loaded_parts
 
 OWN = """
 import rift_cl as rift
@@ -110,3 +111,20 @@ def test_two_files_of_one_name_are_not_taken_for_one(own, tmp_path, capsys):
     other.write_text("")
     assert main(["--load", str(own), "--load", str(other), "devices"]) == InputError.exit_status
     assert "loaded already" in capsys.readouterr().err
+
+
+def test_a_part_that_was_changed_since_is_told(own, scan, tmp_path, capsys):
+    """The name that a run is repeated by means another filter then."""
+    words = ["reconstruct", str(scan), "--center", "23.5", "--filter", "parzen", "--quiet"]
+    first, again = tmp_path / "a", tmp_path / "b"
+    assert main(["--load", str(own), *words, "--out", str(first)]) == 0
+    config = ["reconstruct", "--config", str(first / "config.json"), "--quiet"]
+    assert main([*config, "--out", str(again)]) == 0
+    assert "changed since" not in capsys.readouterr().err
+    own.write_text(OWN.replace("** 2", "** 3"))
+    with pytest.warns(UserWarning, match=r"parzen\.py \(--load\) was changed since that run"):
+        main([*config, "--out", str(tmp_path / "c")])
+    before = ReconstructSettings(scan, first).decisive()
+    assert before["file of --load parzen.py"] == loaded_parts()["parzen.py"]
+    assert main([*words, "--out", str(first), "--resume"]) == CheckpointError.exit_status
+    assert "file of --load parzen.py" in capsys.readouterr().err

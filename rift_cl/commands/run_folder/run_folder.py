@@ -21,12 +21,13 @@ from typing import Any
 
 from rift_cl import __version__
 from rift_cl.cl.device import Device
-from rift_cl.commands.run_folder.saved_settings import options_of, record_of
+from rift_cl.commands.run_folder.saved_settings import LOADED, options_of, record_of
 from rift_cl.errors import CheckpointError, InputError, OutputError
 from rift_cl.io.folder_lock import LOCK_NAME, keep, let_go
 from rift_cl.io.json_fields import read_json_object
 from rift_cl.io.output import PART, json_text, make_folder, write_json, write_text, writing
 from rift_cl.json_parsing import parse_json
+from rift_cl.own_parts import loaded_parts
 from rift_cl.report.html_page import Page
 
 _CONFIG = "config.json"
@@ -264,6 +265,7 @@ class RunFolder:
         """
         given = {} if asked is None else {"asked": _changed(asked)}
         given |= {} if self._read is None else {"read": self._read}
+        given |= {LOADED: loaded} if (loaded := loaded_parts()) else {}
         config = {
             "job": self._job,
             "complete": True,
@@ -361,7 +363,8 @@ def files_read(settings: Any) -> Iterator[Path]:
 
 def _stamps(settings: Any, out: Path) -> dict[str, str]:
     """Sizes and times of change of what a run reads, but for its own, by whole paths."""
-    own, stamps = Path(os.path.realpath(out)), {}
+    own = Path(os.path.realpath(out))
+    stamps = {f"the file of --load {name}": digits for name, digits in loaded_parts().items()}
     for named in files_read(settings):
         # A text that names a part of the scan may be no path at all.
         with suppress(OSError, ValueError):

@@ -10,6 +10,7 @@ from __future__ import annotations
 import dataclasses
 import difflib
 import types
+import warnings
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Annotated, Any, Literal, NamedTuple, TypeVar, Union, get_args, get_origin
@@ -20,12 +21,17 @@ import tyro
 from rift_cl import __version__
 from rift_cl.commands.options import KIND, MISSING, default_of, kinds_of, option_name
 from rift_cl.errors import InputError, SettingError
+from rift_cl.own_parts import loaded_parts
 
 S = TypeVar("S")
 # Options that say how a command runs, not what comes out: they are not repeated.
 _NOT_REPEATED = (
     *("cluster", "config", "dry_run", "overwrite", "part_timeout", "preview", "resume", "view"),
 )
+
+
+# Of config.json: what --load ran, by name, with hashes.
+LOADED = "loaded"
 
 
 class Option(NamedTuple):
@@ -130,11 +136,24 @@ def saved_settings(path: Path, job: str, settings: type[S]) -> S:
             f"--config {path}: was written by version {version!r}, this is {__version__}, whose "
             "settings may mean something else: give them as options"
         )
+    _doubt_parts(record.get(LOADED), path)
     repeated = {name: value for name, value in values.items() if name not in _NOT_REPEATED}
     where = f"--config {path}: 'rift {job}'"
     saved = _read_tree(settings, None, repeated, where, open_ended=True)
     _check_saved(saved, where)
     return saved
+
+
+def _doubt_parts(before: Any, path: Path) -> None:
+    """Warn where a file of one's own parts is another than when the run was made."""
+    now = loaded_parts()
+    for name, digits in before.items() if isinstance(before, dict) else ():
+        if name in now and now[name] != digits:
+            warnings.warn(
+                f"--config {path}: {name} (--load) was changed since that run: what comes out may "
+                "be another",
+                stacklevel=2,
+            )
 
 
 def _check_saved(saved: Any, where: str) -> None:
