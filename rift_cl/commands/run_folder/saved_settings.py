@@ -408,7 +408,10 @@ def _kind_of(field: dataclasses.Field[Any], default: Any, given: Any) -> tuple[A
         return kind, kind
     known = kinds_of(field)
     if kind not in known:
-        raise InputError(f"{field.name} is {kind!r}, wanted one of {', '.join(known)}")
+        raise InputError(
+            f"{field.name} is {kind!r}, wanted one of {', '.join(known)}, or one of yours that was "
+            "registered (in a shell: rift --load FILE.py COMMAND)"
+        )
     return (default if registry[kind] is type(default) else registry[kind]()), values
 
 
