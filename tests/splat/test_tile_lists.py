@@ -91,6 +91,13 @@ def test_every_way_of_cutting_the_work(device, monkeypatch, least, sort):
         _check(device, boxes, np.round(depth), tiles_x=4, tiles_y=3, sort=sort)
 
 
+def test_lists_of_several_chunks_on_the_device_as_it_is(monkeypatch):
+    """The tests of this file may all run on a CPU taken for a GPU, which has kernels of its own."""
+    monkeypatch.setattr(SUMS, "_CPU_LEAST", 16)
+    boxes, depth = _scene(100, tiles_x=6, tiles_y=5)
+    _check(rift.default_device(), boxes, depth, tiles_x=6, tiles_y=5)
+
+
 @pytest.mark.parametrize("count", [1, 255, 256, 257, 4096, 4097, 16384, 16385, 70000])
 @pytest.mark.parametrize("wide", [False, True])
 def test_prefix_sums(device, count, wide):
