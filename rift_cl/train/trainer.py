@@ -38,7 +38,7 @@ from rift_cl.train.schedules import CoefficientSchedule, LearningRateSchedule
 from rift_cl.train.settings import TrainSettings
 from rift_cl.train.start.points import scene_extent
 from rift_cl.train.state_schema import check_state
-from rift_cl.train.strategy import TrainingRun
+from rift_cl.train.strategy import Strategy, TrainingRun
 from rift_cl.train.surface_settings import SurfacePenalties
 
 # Steps between two reports; the loss comes to the host for each.
@@ -120,6 +120,12 @@ class Trainer:
             settings.steps, settings.splats, settings.seed, extent, self.schedule.cooldown
         )
         self.strategy = settings.strategy.begin(parameters, run)
+        if not isinstance(self.strategy, Strategy) or not hasattr(self.strategy, "run"):
+            kind = type(settings.strategy).__name__
+            raise InputError(
+                f"{kind}.begin: gave {self.strategy!r}, wanted a Strategy, whose own __init__ "
+                "calls super().__init__(run)"
+            )
         rendering = self.strategy.render_settings(rendering or SplatSettings())
         self.renderer = Renderer(rendering, device=self.device)
         self.coefficient_schedule = CoefficientSchedule(settings, pictures.cameras, flat=flat)
@@ -221,6 +227,11 @@ class Trainer:
         )
         self._add_coefficients()
         self.parameters = self.strategy.after_step(parameters, frame, gradients, rates["means"])
+        if not isinstance(self.parameters, Parameters):
+            raise InputError(
+                f"{type(self.strategy).__name__}.after_step: gave {self.parameters!r}, wanted the "
+                "Parameters to go on with"
+            )
         if not len(self.parameters):
             raise InputError(f"step {step + 1}: the strategy has removed every splat")
         relocated = self.parameters is not parameters

@@ -199,3 +199,60 @@ def test_a_fit_that_diverges_stops_where_it_is_seen(device, monkeypatch):
     monkeypatch.setattr(trainer, "_step", lambda: real() * np.float32(np.nan))
     with pytest.raises(NonFiniteError, match="after step 25: the fit has diverged"):
         list(trainer.run())
+
+
+def _trainer(device, settings):
+    view = np.eye(4)
+    view[2, 3] = 4
+    cameras = [Camera((16, 16), [[16, 0, 8], [0, 16, 8], [0, 0, 1]], view)]
+    points = np.random.default_rng(0).uniform(-1, 1, (20, 3))
+    splats = Parameters.of(device, start_splats(points))
+    pictures = ImageViews(device, cameras, [np.ones((16, 16, 3))])
+    return Trainer(pictures, splats, TrainSettings(steps=2, strategy=settings))
+
+
+@dataclass(frozen=True)
+class Forgetful(StrategySettings):
+    """Begins with whatever is asked for."""
+
+    made: str = "nothing"
+
+    def begin(self, parameters, run):
+        class Runless(Strategy):
+            def __init__(self, run):
+                pass
+
+        class Lost(Strategy):
+            def after_step(self, parameters, frame, gradients, learning_rate):
+                pass
+
+        return {"nothing": None, "runless": Runless(run), "lost": Lost(run)}[self.made]
+
+
+@pytest.mark.parametrize(
+    ("made", "said"),
+    [
+        ("nothing", r"Forgetful\.begin: gave None, wanted a Strategy"),
+        ("runless", r"Forgetful\.begin: .* super\(\).__init__\(run\)"),
+        ("lost", r"Lost\.after_step: gave None, wanted the Parameters"),
+    ],
+)
+def test_a_strategy_that_gives_nothing_is_named(device, made, said):
+    with pytest.raises(InputError, match=said):
+        for _ in _trainer(device, Forgetful(made)).run():
+            pass
+
+
+def test_a_misspelt_hook_and_a_setting_without_a_default_are_refused():
+    with pytest.raises(InputError, match=r"after_steps: .* did you mean after_step\?"):
+
+        class Deaf(Strategy):
+            def after_steps(self, parameters, frame, gradients, learning_rate):
+                return parameters
+
+    @dataclass(frozen=True)
+    class Wanting(Still):
+        every: int
+
+    with pytest.raises(InputError, match=r"Wanting\.every has no default"):
+        register_strategy("wanting", Wanting)

@@ -8,7 +8,8 @@ X-ray splats, whose densities add up. ``protocol`` says how to write another.
 
 from __future__ import annotations
 
-from dataclasses import is_dataclass
+from dataclasses import MISSING, fields, is_dataclass
+from typing import Any
 
 from rift_cl.errors import InputError
 from rift_cl.registry import Registry
@@ -58,11 +59,19 @@ def register_strategy(
         replace: take the place of one that was registered by that name before.
 
     Raises:
-        InputError: the name is taken, or the settings are no such class.
+        InputError: the name is taken, or the settings are no such class, or want a value.
     """
     kinds = isinstance(settings, type), is_dataclass(settings)
     if not (all(kinds) and issubclass(settings, StrategySettings)):
         raise InputError(
             f"register_strategy: {settings!r} is not a dataclass derived from StrategySettings"
+        )
+    known: Any = settings
+    open_ended = [each.name for each in fields(known)
+                  if each.default is MISSING and each.default_factory is MISSING]  # fmt: skip
+    if open_ended:
+        raise InputError(
+            f"register_strategy: {settings.__name__}.{open_ended[0]} has no default, which every "
+            "setting of a strategy wants"
         )
     STRATEGIES.add(name, settings, replace=replace)

@@ -10,11 +10,12 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from difflib import get_close_matches
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
 from numpy.typing import NDArray
 
-from rift_cl.errors import CheckpointError
+from rift_cl.errors import CheckpointError, InputError
 
 if TYPE_CHECKING:
     from rift_cl.cl.array import DeviceArray
@@ -41,6 +42,9 @@ class TrainingRun:
     extent: float
     cooldown: int
 
+
+# How alike two names are of which one is the other misspelt.
+_NEARLY = 0.85
 
 S = TypeVar("S", bound="StrategySettings")
 
@@ -93,6 +97,22 @@ class Strategy:
 
     def __init__(self, run: TrainingRun) -> None:
         self.run = run
+
+    def __init_subclass__(cls, **more: Any) -> None:
+        """Refuse a hook whose name is misspelt, which nobody would ever call.
+
+        Raises:
+            InputError: a method is called nearly as a hook is.
+        """
+        super().__init_subclass__(**more)
+        hooks = [name for name in vars(Strategy) if not name.startswith("_")]
+        for name, own in vars(cls).items():
+            near = [] if name in hooks else get_close_matches(name, hooks, 1, _NEARLY)
+            if near and callable(own):
+                raise InputError(
+                    f"{cls.__name__}.{name}: a strategy has no hook of this name; did you mean "
+                    f"{near[0]}?"
+                )
 
     def render_settings(self, settings: SplatSettings) -> SplatSettings:
         """How frames have to be rendered, so that their gradients hold all that is needed."""
