@@ -10,17 +10,10 @@
  * Buffers: values[count], sums[WHOLE ? 1 : (count + run - 1) / run]. */
 
 #include "include/portable.h"
+#include "include/vector/scan_number.h"
 
-#ifndef WIDE
-#define WIDE 0
-#endif
 #ifndef WHOLE
 #define WHOLE 0
-#endif
-#if WIDE
-typedef long number;
-#else
-typedef int number;
 #endif
 
 KERNEL void scan_place_cpu(

@@ -12,17 +12,10 @@
 
 #include "include/portable.h"
 #include "include/vector/group_sum.h"
+#include "include/vector/scan_number.h"
 
-#ifndef WIDE
-#define WIDE 0
-#endif
 #ifndef WHOLE
 #define WHOLE 0
-#endif
-#if WIDE
-typedef long number;
-#else
-typedef int number;
 #endif
 #define EACH 16
 

@@ -9,15 +9,7 @@
  * Buffers: values[count], sums[(count + run - 1) / run]. */
 
 #include "include/portable.h"
-
-#ifndef WIDE
-#define WIDE 0
-#endif
-#if WIDE
-typedef long number;
-#else
-typedef int number;
-#endif
+#include "include/vector/scan_number.h"
 
 KERNEL void scan_sum_cpu(
     __global const number *restrict values, __global long *restrict sums, int count, int run)

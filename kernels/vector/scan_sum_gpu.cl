@@ -11,15 +11,7 @@
 
 #include "include/portable.h"
 #include "include/vector/group_sum.h"
-
-#ifndef WIDE
-#define WIDE 0
-#endif
-#if WIDE
-typedef long number;
-#else
-typedef int number;
-#endif
+#include "include/vector/scan_number.h"
 
 KERNEL void scan_sum_gpu(
     __global const number *restrict values, __global long *restrict sums, int count, int run)
