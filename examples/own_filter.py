@@ -1,7 +1,8 @@
 """A filter of your own: a function of frequency gets a name.
 
 ``rift.register_filter`` makes the name known to ``rift.fbp``, to ``rift.reconstruct_scan`` and to
-``rift reconstruct --filter`` in this process. Run it with the number of pixels along an edge.
+``rift reconstruct --filter`` in this process. Run it with the number of pixels along an
+edge, or give it to ``rift --load``.
 """
 
 import sys
@@ -18,13 +19,20 @@ def butterworth(frequency):
 
 rift.register_filter("butterworth", butterworth)
 
-size = int(sys.argv[1]) if sys.argv[1:] else 256
-grid = rift.Grid((size, size))
-scan = rift.Parallel(np.linspace(0, np.pi, size, endpoint=False), bins=size * 3 // 2)
-A = rift.Projector(grid, scan)
-truth = rift.phantom.shepp_logan(grid)
-sinogram = rift.phantom.shepp_logan_sinogram(grid, scan)
-noisy = sinogram + 0.02 * sinogram.max() * np.random.default_rng(0).normal(size=sinogram.shape)
-for name in ("ram-lak", "butterworth"):
-    image = rift.fbp(A, noisy, filter=name)
-    print(f"{name}: {rift.metrics.psnr(image, truth, peak=truth.max()):.1f} dB")
+
+def main():
+    """Reconstruct a noisy head with the ramp and with this filter."""
+    size = int(sys.argv[1]) if sys.argv[1:] else 256
+    grid = rift.Grid((size, size))
+    scan = rift.Parallel(np.linspace(0, np.pi, size, endpoint=False), bins=size * 3 // 2)
+    A = rift.Projector(grid, scan)
+    truth = rift.phantom.shepp_logan(grid)
+    sinogram = rift.phantom.shepp_logan_sinogram(grid, scan)
+    noisy = sinogram + 0.02 * sinogram.max() * np.random.default_rng(0).normal(size=sinogram.shape)
+    for name in ("ram-lak", "butterworth"):
+        image = rift.fbp(A, noisy, filter=name)
+        print(f"{name}: {rift.metrics.psnr(image, truth, peak=truth.max()):.1f} dB")
+
+
+if __name__ == "__main__":
+    main()
