@@ -24,12 +24,13 @@ KERNEL void tile_histogram_gpu(
   for (int tile = item; tile < tiles; tile += GROUP) own[tile] = 0;
   const int begin = CHUNK_BEGIN(chunk, chunks, pairs), end = CHUNK_BEGIN(chunk + 1, chunks, pairs);
   const int2 there = ranks_of_chunk(ends, item, begin, end, offsets, splats);
-  for (int first = begin; first < end; first += GROUP) {
-    const int pair = first + item;
+  /* Pairs may be as many as an int tells, and the last group's items stand behind them. */
+  for (long first = begin; first < end; first += GROUP) {
+    const long pair = first + item;
     int tile = NO_KEY;
     if (pair < end) {
-      const int rank = rank_of(pair, offsets, there.x, there.y);
-      tile = tile_at(ranks[rank], pair - offsets[rank], tiles_x, first_tile_row);
+      const int rank = rank_of((int)pair, offsets, there.x, there.y);
+      tile = tile_at(ranks[rank], (int)pair - offsets[rank], tiles_x, first_tile_row);
     }
     ((__local int *)keys)[item] = tile;
     barrier(CLK_LOCAL_MEM_FENCE | CLK_GLOBAL_MEM_FENCE);

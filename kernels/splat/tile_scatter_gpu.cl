@@ -29,12 +29,14 @@ KERNEL void tile_scatter_gpu(
   __global int *own = table + (long)chunk * tiles;
   const int begin = CHUNK_BEGIN(chunk, chunks, pairs), end = CHUNK_BEGIN(chunk + 1, chunks, pairs);
   const int2 there = ranks_of_chunk(ends, item, begin, end, offsets, splats);
-  for (int first = begin; first < end; first += GROUP) {
-    const int pair = first + item;
+  /* Pairs may be as many as an int tells, and the last group's items stand behind them. */
+  for (long first = begin; first < end; first += GROUP) {
+    const long pair = first + item;
     int tile = NO_KEY;
     int2 entry = (int2)(0, 0);
     if (pair < end) {
-      const int rank = rank_of(pair, offsets, there.x, there.y), skip = pair - offsets[rank];
+      const int rank = rank_of((int)pair, offsets, there.x, there.y);
+      const int skip = (int)pair - offsets[rank];
       tile = tile_at(ranks[rank], skip, tiles_x, first_tile_row);
       entry = (int2)(owners[rank].y, owners[rank].x + skip);
     }
