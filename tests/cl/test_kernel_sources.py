@@ -223,7 +223,8 @@ def test_failed_build_leaves_the_device_usable(fresh, kernels):
 
 def test_macros_reach_the_kernel_with_their_type(device, kernels):
     (kernels / "probe.cl").write_text(
-        "/* Divides. */\n__kernel void probe(__global float *p) { *p = VALUE / 2; }\n"
+        "/* Divides. Buffers: p[1]. */\n"
+        "__kernel void probe(__global float *p) { *p = VALUE / 2; }\n"
     )
     target = device.zeros(device.traits.macros["GROUP"])
     for value, wanted in ((3, 1.0), (3.0, 1.5), (np.float32(3), 1.5), (np.int64(3), 1.0)):

@@ -209,8 +209,7 @@ def test_kernel_is_built_and_first_launched_by_a_child_before(device, kept, fold
 
 
 # Crashes when it is launched, unless it is built with the workaround that redefines "static".
-LATE = """// Buffers:
-//   y       [size] as it was read
+LATE = """/* Buffers: y[*]. */
 #ifdef static
 #define PLACE y
 #else

@@ -167,7 +167,9 @@ def test_backproject_is_the_scaled_adjoint(device):
     np.testing.assert_allclose(backproject(A, y), factor * A.T(y), rtol=1e-6)
     even = Parallel(np.linspace(0, np.pi, 12, endpoint=False), 33, 0.8)
     A = Projector(grid, even, device=device)
-    np.testing.assert_allclose(backproject(A, y), fbp(A, y, np.ones_like), atol=1e-5 * abs(y).max())
+    with pytest.warns(UserWarning, match="'ones_like' is .* times the ramp"):
+        alike = fbp(A, y, np.ones_like)
+    np.testing.assert_allclose(backproject(A, y), alike, atol=1e-5 * abs(y).max())
 
 
 def test_a_copy_of_the_backprojection_makes_slabs_too(device):
