@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import shutil
 import sys
 from importlib.metadata import PackageNotFoundError
 from pathlib import Path
@@ -85,3 +86,15 @@ def test_a_folder_with_a_space_is_told_and_left_out(wheel, monkeypatch):
     with pytest.warns(UserWarning, match="space in its path"):
         intel_runtime.register_intel_runtime()
     assert not os.environ["OCL_ICD_VENDORS"]
+
+
+def test_a_folder_that_was_cleared_is_written_again_for_a_child(wheel, monkeypatch, tmp_path):
+    intel_runtime.register_intel_runtime()
+    folder = Path(os.environ["OCL_ICD_VENDORS"])
+    shutil.rmtree(folder)
+    intel_runtime.renew_intel_runtime()
+    assert folder.is_dir()
+    # A folder that somebody else chose is none of ours.
+    monkeypatch.setenv("OCL_ICD_VENDORS", str(tmp_path / "theirs"))
+    intel_runtime.renew_intel_runtime()
+    assert not (tmp_path / "theirs").exists()

@@ -130,7 +130,7 @@ def test_next_run_after_clearing_works_in_the_same_process_and_in_another(cache,
     again = (
         "from rift_cl.cl.build.kernel_cache import cache_size, clear_cache\n"
         "print(clear_cache() > 10_000, cache_size() < 100)\n"
-        "print(works(rift.Device(device._handle, '0:0')))\n"
+        "print(works(rift.Device(device._handle, device.selector)))\n"
     )
     done = python(PROGRAM + again, RIFT_CACHE_DIR=str(cache))
     assert done.stdout.split() == ["True"] * 4, done.stderr

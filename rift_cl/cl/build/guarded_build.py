@@ -27,6 +27,7 @@ from typing import Any, NamedTuple
 
 from rift_cl.cl.build.cache_check import program_files
 from rift_cl.cl.build.first_launch import FirstLaunch, without_numbers
+from rift_cl.cl.build.intel_runtime import renew_intel_runtime
 from rift_cl.cl.build.kernel_cache import LEAST_ROOM, cache_folder, room
 from rift_cl.cl.build.program_store import write_whole
 from rift_cl.cl.build.worker import SCRATCH, read_message, write_message
@@ -202,6 +203,7 @@ class Worker:
         Raises:
             DeviceError: no child can be started.
         """
+        renew_intel_runtime()
         limit = self.limit if limit is None else limit
         with self._asking:
             fresh = self._process is None

@@ -12,6 +12,7 @@ import os
 import sys
 import warnings
 from collections.abc import Iterator
+from contextlib import suppress
 from importlib.metadata import PackageNotFoundError, distribution
 from pathlib import Path
 
@@ -45,10 +46,17 @@ def register_intel_runtime() -> None:
         # The loader of Windows takes libraries by name beside those of the registry.
         os.environ["OCL_ICD_FILENAMES"] = str(library)
         return
-    try:
+    with suppress(OSError):
         os.environ["OCL_ICD_VENDORS"] = str(_vendors(library))
-    except OSError:
-        return
+
+
+def renew_intel_runtime() -> None:
+    """Write the folder again where the cache was cleared since; call before a child looks there."""
+    folder, library = os.environ.get("OCL_ICD_VENDORS", ""), _library()
+    ours = library is not None and Path(folder).name == _environment(library)
+    if library is not None and ours and not Path(folder).is_dir():
+        with suppress(OSError):
+            _vendors(library)
 
 
 def _library() -> Path | None:
@@ -62,11 +70,14 @@ def _library() -> Path | None:
     return next((path for path in found if path.is_file()), None)
 
 
+def _environment(library: Path) -> str:
+    """What the folder is called: environments that share the cache have each their own driver."""
+    return hashlib.sha256(str(library).encode()).hexdigest()[:16]
+
+
 def _vendors(library: Path) -> Path:
     """A folder that leads a loader to this library and to what the system has."""
-    # Environments that share the cache have each a driver of their own.
-    environment = hashlib.sha256(str(library).encode()).hexdigest()[:16]
-    folder = cache_folder() / "vendors" / environment
+    folder = cache_folder() / "vendors" / _environment(library)
     folder.mkdir(mode=0o700, parents=True, exist_ok=True)
     wanted = dict(_of_the_system()) | {"rift-intel.icd": f"{library}\n"}
     for old in folder.iterdir():
