@@ -76,7 +76,11 @@ def test_compensated_levels_of_few_views_are_right(device, name, compensate):
     assert abs(share - 1) < {"few": 0.05, "clustered": 0.05, "wedge": 0.12, "one": 0.9}[name]
 
 
-@pytest.mark.parametrize("filter", ["ram-lak", "hann", "high-pass", np.sqrt])
+def soft(frequency):
+    return frequency / (1 + frequency)
+
+
+@pytest.mark.parametrize("filter", ["ram-lak", "hann", "high-pass", soft])
 @pytest.mark.parametrize("compensate", COMPENSATIONS)
 def test_even_angles_need_no_compensation(device, compensate, filter):
     """The same image as without, however few views there are, and whatever the noise."""
