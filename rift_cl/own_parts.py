@@ -19,7 +19,8 @@ from rift_cl.errors import InputError
 VARIABLE = "RIFT_LOAD"
 # Before the name of the file, which may be that of a package.
 _PREFIX = "rift_own_"
-_DIGITS = 12
+# Where a file that was run keeps its hash, and how much of that.
+_DIGEST, _DIGITS = "__rift_digest__", 12
 
 
 def load_parts(paths: Sequence[str] = ()) -> None:
@@ -40,18 +41,18 @@ def load_parts(paths: Sequence[str] = ()) -> None:
 
 
 def loaded_parts() -> dict[str, str]:
-    """The files that were run, by name, with the first digits of their SHA-256 as they are now.
+    """The files that were run, by name, with the first digits of their SHA-256 at that time.
 
     A run is repeated, and gone on with, by the names of the parts that it used; these tell whether
     a name still means the same.
     """
-    files = [Path(str(module.__file__)) for name, module in sorted(sys.modules.items())
-             if name.startswith(_PREFIX)]  # fmt: skip
-    return {
-        file.name: hashlib.sha256(file.read_bytes()).hexdigest()[:_DIGITS]
-        for file in files
-        if file.is_file()
-    }
+    modules = [module for name, module in sorted(sys.modules.items()) if name.startswith(_PREFIX)]
+    return {Path(str(module.__file__)).name: vars(module)[_DIGEST] for module in modules}
+
+
+def decisive_parts() -> dict[str, str]:
+    """The same, as settings on which the outcome of a run depends."""
+    return {f"file of --load {name}": digest for name, digest in loaded_parts().items()}
 
 
 def _load(file: Path) -> None:
@@ -66,6 +67,7 @@ def _load(file: Path) -> None:
     spec = importlib.util.spec_from_file_location(name, file)
     assert spec is not None and spec.loader is not None
     module = importlib.util.module_from_spec(spec)
+    vars(module)[_DIGEST] = hashlib.sha256(file.read_bytes()).hexdigest()[:_DIGITS]
     # Classes of the file are found here by processes that are handed their objects.
     sys.modules[name] = module
     try:

@@ -122,6 +122,12 @@ def test_a_part_that_was_changed_since_is_told(own, scan, tmp_path, capsys):
     assert main([*config, "--out", str(again)]) == 0
     assert "changed since" not in capsys.readouterr().err
     own.write_text(OWN.replace("** 2", "** 3"))
+    # What is running has loaded the file as it was; the next process has it as it is.
+    assert main([*config, "--out", str(tmp_path / "d")]) == 0
+    assert "changed since" not in capsys.readouterr().err
+    del sys.modules["rift_own_parzen"]
+    FILTERS.remove("parzen")
+    load_parts([str(own)])
     with pytest.warns(UserWarning, match=r"parzen\.py \(--load\) was changed since that run"):
         main([*config, "--out", str(tmp_path / "c")])
     before = ReconstructSettings(scan, first).decisive()

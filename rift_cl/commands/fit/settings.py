@@ -14,7 +14,7 @@ from rift_cl.commands.run_folder.saved_settings import (
 )
 from rift_cl.errors import InputError
 from rift_cl.option_marks import RUN, Expert
-from rift_cl.own_parts import loaded_parts
+from rift_cl.own_parts import decisive_parts
 from rift_cl.splat.settings import SplatSettings
 from rift_cl.train.settings import TrainSettings
 
@@ -154,7 +154,7 @@ class FitSettings:
             option.name: _whole(option.value)
             for option in options_of(self)
             if not option.fixed and option.name not in _FREE
-        } | {f"file of --load {name}": digits for name, digits in loaded_parts().items()}
+        } | decisive_parts()
 
     def command(self) -> str:
         """The command line that resumes this fit."""

@@ -11,7 +11,7 @@ from rift_cl.commands.inputs.scan_input import ScanInput
 from rift_cl.commands.options import SpreadRun
 from rift_cl.errors import InputError
 from rift_cl.option_marks import Auto, AutoExpert, Expert
-from rift_cl.own_parts import loaded_parts
+from rift_cl.own_parts import decisive_parts
 
 if TYPE_CHECKING:
     from rift_cl.io.scans.scan_file import ScanFile
@@ -323,4 +323,4 @@ class ReconstructSettings(
             name: str(value)
             for name, value in dataclasses.asdict(self).items()
             if name not in _FREE
-        } | {f"file of --load {name}": digits for name, digits in loaded_parts().items()}
+        } | decisive_parts()

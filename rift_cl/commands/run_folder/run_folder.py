@@ -27,7 +27,7 @@ from rift_cl.io.folder_lock import LOCK_NAME, keep, let_go
 from rift_cl.io.json_fields import read_json_object
 from rift_cl.io.output import PART, json_text, make_folder, write_json, write_text, writing
 from rift_cl.json_parsing import parse_json
-from rift_cl.own_parts import loaded_parts
+from rift_cl.own_parts import decisive_parts, loaded_parts
 from rift_cl.report.html_page import Page
 
 _CONFIG = "config.json"
@@ -363,8 +363,7 @@ def files_read(settings: Any) -> Iterator[Path]:
 
 def _stamps(settings: Any, out: Path) -> dict[str, str]:
     """Sizes and times of change of what a run reads, but for its own, by whole paths."""
-    own = Path(os.path.realpath(out))
-    stamps = {f"the file of --load {name}": digits for name, digits in loaded_parts().items()}
+    own, stamps = Path(os.path.realpath(out)), decisive_parts()
     for named in files_read(settings):
         # A text that names a part of the scan may be no path at all.
         with suppress(OSError, ValueError):
