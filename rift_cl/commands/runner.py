@@ -74,9 +74,11 @@ def exit_status(run: Callable[[], int]) -> int:
 
 
 def told(run: Callable[[], int]) -> int:
-    """Run something; an error of ours becomes one sentence and an exit status."""
+    """Run something; warnings, and an error of ours, become a sentence, that an exit status."""
     try:
-        return run()
+        with warnings.catch_warnings():
+            warnings.showwarning = _show_warning
+            return run()
     except RiftError as error:
         return _say(f"rift: {error}", error.exit_status)
 
@@ -233,9 +235,7 @@ def _guarded(
 ) -> int:
     """Make the settings and run a command; an error becomes one sentence and an exit status."""
     try:
-        with warnings.catch_warnings():
-            warnings.showwarning = _show_warning
-            run(made(), output)
+        run(made(), output)
     except RiftError as error:
         if output.debug:
             traceback.print_exc()
