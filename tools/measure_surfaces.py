@@ -49,7 +49,10 @@ VARIANTS: dict[str, Settings] = {
     "opacities penalised": {"strategy.opacity_penalty": 0.01},
     "flatness": {"surface.flatness": 0.1},
     "opacity entropy": {"surface.opacity_entropy": 0.01},
-    "normal consistency": {"surface.normal_consistency": 0.03},
+    "normal consistency, flatness": {
+        "surface.normal_consistency": 0.01,
+        "surface.flatness": 0.03,
+    },
     "more normal consistency": {"surface.normal_consistency": 0.1},
     "preset surface": PRESETS["surface"],
 }
@@ -225,7 +228,10 @@ def _decibels(one: Mapping[str, Any] | None) -> str:
 
 
 def _words(settings: Settings) -> str:
-    return " ".join(f"`--{name.replace('_', '-')} {value:g}`" for name, value in settings.items())
+    options = [(name.replace("_", "-"), value) for name, value in settings.items()]
+    return " ".join(
+        f"`--{name} {value if isinstance(value, str) else f'{value:g}'}`" for name, value in options
+    )
 
 
 def page(options: Options, found: Sequence[Mapping[str, Any]], device: rift.Device) -> str:

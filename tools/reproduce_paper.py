@@ -38,6 +38,7 @@ from paper import (
     figure_13,
     figure_14,
     figure_15,
+    hybrid,
     merit_study,
     planned_ornament,
     planned_views,
@@ -68,6 +69,7 @@ FIGURES: tuple[ModuleType, ...] = (
     slice_bias,
     spectral_bias,
     field_bias,
+    hybrid,
     compensation,
     convergence,
     merit_study,
@@ -83,6 +85,7 @@ FITTED: tuple[ModuleType, ...] = (
     figure_12,
     spectral_bias,
     field_bias,
+    hybrid,
     aperture_filter,
 )
 

@@ -27,7 +27,13 @@ from rift_cl.cl.failures import driver_errors, named_error, named_errors
 from rift_cl.cl.grid_parts import GridPart, Size, grid_parts
 from rift_cl.cl.launch_times import LaunchTimes
 from rift_cl.cl.process import claim_process
-from rift_cl.cl.signature import Arguments, Signature, check_numbers, signature
+from rift_cl.cl.signature import (
+    Arguments,
+    Signature,
+    check_macros,
+    check_numbers,
+    signature,
+)
 from rift_cl.cl.watchdog import in_driver
 from rift_cl.errors import DeviceError, KernelArgumentError, KernelBuildError
 from rift_cl.progress import BUILDS
@@ -260,8 +266,10 @@ class Programs:
         return self._built((name, tuple(sorted(smaller.items()))), group // 2)
 
     def _signature(self, name: str, macros: Any) -> Signature:
+        source = kernel_source(name)
+        check_macros(name, source, [macro for macro, _ in macros])
         try:
-            return signature(name, kernel_source(name), self._builder.defines(macros))
+            return signature(name, source, self._builder.defines(macros))
         except ValueError as error:
             raise KernelBuildError(f"kernel {name}: {error}") from error
 

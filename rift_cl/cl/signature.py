@@ -11,7 +11,8 @@ writes into another's memory, in silence.
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from difflib import get_close_matches
 from operator import itemgetter
 from typing import Any, NamedTuple, NoReturn
 
@@ -31,6 +32,7 @@ _TYPES = {
     "float": np.float32,
     "double": np.float64,
 }
+_WORD = re.compile(r"\w+")
 _COMMENT = re.compile(r"/\*.*?\*/|//[^\n]*", re.DOTALL)
 _ALIAS = re.compile(r"typedef\s+(\w+)\s+(\w+)\s*;")
 # Launches of one place that are remembered: what is seen of a scene differs from view to view.
@@ -217,6 +219,20 @@ def check_names(name: str, wanted: tuple[Parameter, ...], given: Mapping[str, An
         raise KernelArgumentError(
             f"kernel {name}: {', '.join(faults)}; it takes {', '.join(takes)}"
         )
+
+
+def check_macros(name: str, source: str, given: Iterable[str]) -> None:
+    """See that a kernel's source speaks of the compile-time constants that a launch gives it.
+
+    Raises:
+        KernelArgumentError: one stands nowhere in it, so that giving it changes nothing.
+    """
+    words = set(_WORD.findall(_COMMENT.sub(" ", source)))
+    for macro in given:
+        if macro not in words:
+            near = get_close_matches(macro, filter(str.isupper, words), 1)
+            meant = f"; did you mean {near[0]}?" if near else ""
+            raise KernelArgumentError(f"kernel {name}: has no compile-time constant {macro}{meant}")
 
 
 def check_numbers(name: str, wanted: Sequence[Parameter], values: Sequence[Any]) -> None:

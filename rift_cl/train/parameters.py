@@ -21,6 +21,7 @@ from rift_cl.cl.arithmetic import axpby, copy_columns
 from rift_cl.cl.array import DeviceArray
 from rift_cl.cl.device import Device
 from rift_cl.cl.elementwise import multiply
+from rift_cl.errors import InputError
 from rift_cl.splat.projection import SplatGradients
 from rift_cl.splat.renderer import FrameGradients
 from rift_cl.splat.splats import Splats
@@ -169,7 +170,17 @@ class Parameters:
         )
 
     def selected(self, rows: NDArray[np.bool_] | NDArray[np.intp]) -> Parameters:
-        """Some of these splats with their moments, by index or mask; see ``replaced``."""
+        """Some of these splats with their moments, by index or mask; see ``replaced``.
+
+        Raises:
+            InputError: a mask is one of whole numbers, which would be read as indices.
+        """
+        like_mask = rows.dtype.kind in "iu" and len(rows) == len(self) > 2
+        if like_mask and set(np.unique(rows).tolist()) <= {0, 1}:
+            raise InputError(
+                "Parameters.selected: a mask of whole numbers would be read as indices, of splats "
+                "0 and 1 alone: give one of bool, mask.astype(bool)"
+            )
         groups = ({name: array[rows] for name, array in group.items()} for group in self.host())
         return self.replaced(*groups)
 

@@ -166,6 +166,8 @@ class Trainer:
                 loss = float(self.device.get(value)[0])
                 self._check_finite(loss)
                 values = {"loss": loss, "splats": float(len(self.parameters))}
+                if done == total:
+                    self._check_finite_splats(self.parameters.host()[0])
                 yield Report(done, total, "steps", values, (worked, worked + self._work_left()))
             if stop:
                 return
@@ -176,6 +178,18 @@ class Trainer:
                 f"the loss is {loss} after step {self.parameters.step}: the fit has diverged, "
                 "usually by learning rates that are too high or by a loss of one's own that is not "
                 "finite; checkpoints from before are kept"
+            )
+
+    def _check_finite_splats(self, raw: Group) -> None:
+        """Refuse to go on with splats that no image shows and no loss tells of."""
+        lost = np.zeros(len(self.parameters), bool)
+        for array in raw.values():
+            lost |= ~np.isfinite(array).reshape(len(lost), -1).all(axis=1)
+        if lost.any():
+            raise NonFiniteError(
+                f"{lost.sum()} of {len(lost)} splats hold NaN or infinity after step "
+                f"{self.parameters.step}, usually by learning rates that are too high or by a loss "
+                "or strategy of one's own; checkpoints from before are kept"
             )
 
     @final
@@ -232,8 +246,7 @@ class Trainer:
                 f"{type(self.strategy).__name__}.after_step: gave {self.parameters!r}, wanted the "
                 "Parameters to go on with"
             )
-        if not len(self.parameters):
-            raise InputError(f"step {step + 1}: the strategy has removed every splat")
+        self._check_count(len(parameters))
         relocated = self.parameters is not parameters
         if relocated:
             self.coefficient_schedule.hold(self.parameters)
@@ -242,6 +255,17 @@ class Trainer:
         if self._band is not None and (relocated or self.parameters.step % _BAND_EVERY == 0):
             self._limit_band()
         return value
+
+    def _check_count(self, before: int) -> None:
+        """Check what the strategy made of the number of splats."""
+        now, most, step = len(self.parameters), self.settings.splats, self.parameters.step
+        if not now:
+            raise InputError(f"step {step}: the strategy has removed every splat")
+        if now > max(before, most):
+            raise InputError(
+                f"step {step}: {type(self.strategy).__name__} made {now} splats of {before}, "
+                f"wanted at most {most} (TrainSettings.splats)"
+            )
 
     def _surface_penalties(self, step: int) -> SurfacePenalties:
         if step >= self.schedule.cooldown:
@@ -277,9 +301,14 @@ class Trainer:
         return self.pictures.cameras[number] if self.poses is None else self.poses.camera(number)
 
     def state(self) -> dict[str, NDArray[Any]]:
-        """All that changes from step to step, as host arrays by name."""
+        """All that changes from step to step, as host arrays by name.
+
+        Raises:
+            NonFiniteError: splats hold NaN or infinity.
+        """
         parameters = self.parameters
         raw, first, second = parameters.host()
+        self._check_finite_splats(raw)
         groups: dict[str, Group] = {
             "raw": raw,
             "first": first,

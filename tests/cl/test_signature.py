@@ -136,3 +136,11 @@ def test_a_vector_by_value_has_its_length_and_type(device):
     for wrong in (np.ones(4), np.ones(3, np.float32), 1.0):
         with pytest.raises(KernelArgumentError, match=r"\bargument offset\b"):
             device.launch("expose", (1,), **arrays, gain=plain, offset=wrong, pixels=1)
+
+
+def test_a_constant_that_a_kernel_does_not_have_is_refused(device):
+    array = device.zeros(4)
+    given = {"x": array, "y": array, "a": 1.0, "b": 1.0, "size": 4}
+    with pytest.raises(KernelArgumentError, match="kernel axpby: has no compile-time constant RUM"):
+        device.launch("axpby", (4,), **given, RUM=1)
+    assert not device.get(array).any()

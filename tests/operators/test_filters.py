@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from rift_cl import Grid, HighPass, Parallel, Projector, Ramp, Response, dot_test, fbp
+from rift_cl import Fan, Grid, HighPass, Parallel, Projector, Ramp, Response, dot_test, fbp
 from rift_cl.errors import InputError, ShapeError
 from rift_cl.operators import FILTERS, ViewFilter, as_filter, register_filter
 from rift_cl.operators.filters.ramp_filters import Finer
@@ -260,6 +260,13 @@ def test_responses_that_are_no_ramp_are_doubted(device, function, said):
     A = Projector(Grid((8, 8), 0.01), Parallel(np.arange(6.0), 13, pitch=0.01), device=device)
     with pytest.warns(UserWarning, match=said):
         fbp(A, white(6, 13), function)
+
+
+def test_a_cone_doubts_responses_as_parallel_beams_do(device):
+    scan = Fan(np.linspace(0, 2 * np.pi, 8, endpoint=False), 13, 0.01, 2, 4)
+    A = Projector(Grid((8, 8), 0.01), scan, device=device)
+    with pytest.warns(UserWarning, match="is -1 times the ramp"):
+        fbp(A, white(8, 13), lambda f: -f)
 
 
 def test_ramps_of_ones_own_are_not_doubted(device, recwarn):

@@ -114,8 +114,8 @@ def test_the_figure_has_all_models_and_goes_on_where_it_was(tool, small, tmp_pat
         last = run["moments"][-1]
         assert len(run["moments"]) == 3 and last["step"] > 0 and last["cpu_s"] > 0
         assert len(last["ring"]["error"]) == len(result["frequency"])
-    monkeypatch.setattr(bias, "_splats", None)
-    monkeypatch.setattr(bias, "_field", None)
+    monkeypatch.setattr(bias, "splat_moments", None)
+    monkeypatch.setattr(bias, "field_moments", None)
     again = list(bias.compute(plan, rift.default_device(), result))[-1]
     assert again["runs"] == result["runs"]
     page = Page("Figures")

@@ -132,6 +132,8 @@ WRONG_LOSSES = {
     "flat": (PixelLoss("sqrt(d * d)", "m * d / sqrt(d * d)"), "at d = 0 .* wanted finite numbers"),
     "halves": (PixelLoss("fabs(d)", "m * (d > 0 ? 1 : -1)"), "does not compile; d and m are vec"),
     "open": (PixelLoss("sqrt(d * d", "d"), "does not compile: .*expected"),
+    "falling": (PixelLoss("1 - d * d", "-2 * d * m"), "falls as images differ more"),
+    "away": (PixelLoss("d * d", "-2 * d * m", surrogate=True), "falls as images differ more"),
 }
 
 
@@ -156,6 +158,7 @@ def test_a_loss_that_is_wrong_is_refused_before_a_fit(device, name):
                   "m * (fabs(d) < 0.1f ? 10 * d : sign(d))"),
         PixelLoss("d > 0 ? 3 * d : -d", "d > 0 ? 3 * m : -m"),
         PixelLoss("d * d", "d > 0 ? m : -m", surrogate=True),
+        PixelLoss("1 + d * d - -1.0f", "2 * d * m - - d * 0.0f + + d * 0.0f"),
     ],
 )  # fmt: skip
 def test_losses_that_are_right_or_meant_so_pass(device, loss):
@@ -171,6 +174,8 @@ def test_losses_that_are_right_or_meant_so_pass(device, loss):
     [
         (lambda s: s._replace(values=s.values[..., :-1]), r"values of .* has shape \(24, 3\)"),
         (lambda s: s._replace(values=np.nan * s.values), "values holds NaN"),
+        (lambda s: s._replace(values=s.values * [1, 1, 0, 1]), "function 2 is 0 everywhere"),
+        (lambda s: s._replace(values=s.values[:, [0, 1, 2, 1]]), "functions 1 and 3 are the same"),
         (lambda s: s._replace(values=2 * s.values), "wanted the constant"),
         (lambda s: s._replace(by_geometry=-s.by_geometry), r"by_geometry\[..., 0\] is"),
         (lambda s: s._replace(by_directions=0 * s.by_directions), r"by_directions\[..., 0\] is"),
@@ -201,6 +206,27 @@ def test_a_fit_that_diverges_stops_where_it_is_seen(device, monkeypatch):
         list(trainer.run())
 
 
+def test_splats_that_are_lost_to_nan_end_a_fit(device):
+    """No image shows them, so that no loss tells of them."""
+    trainer = _trainer(device, Still())
+    before = trainer.state()["raw.means"]
+    broken = before.copy()
+    broken[7, 1] = np.nan
+    trainer.parameters.raw["means"].set(broken)
+    with pytest.raises(NonFiniteError, match="1 of 20 splats hold NaN or infinity after step 0"):
+        trainer.state()
+    with pytest.raises(NonFiniteError, match=r"1 of 20 splats .* after step 2"):
+        list(trainer.run())
+
+
+def test_a_mask_of_whole_numbers_is_not_read_as_indices(device):
+    splats = Parameters.of(device, start_splats(np.eye(3)))
+    assert len(splats.selected(np.array([True, False, True]))) == 2
+    assert len(splats.selected(np.array([2, 0, 1]))) == 3
+    with pytest.raises(InputError, match="mask of whole numbers"):
+        splats.selected(np.array([1, 0, 1]))
+
+
 def _trainer(device, settings):
     view = np.eye(4)
     view[2, 3] = 4
@@ -208,7 +234,7 @@ def _trainer(device, settings):
     points = np.random.default_rng(0).uniform(-1, 1, (20, 3))
     splats = Parameters.of(device, start_splats(points))
     pictures = ImageViews(device, cameras, [np.ones((16, 16, 3))])
-    return Trainer(pictures, splats, TrainSettings(steps=2, strategy=settings))
+    return Trainer(pictures, splats, TrainSettings(steps=2, splats=30, strategy=settings))
 
 
 @dataclass(frozen=True)
@@ -226,7 +252,12 @@ class Forgetful(StrategySettings):
             def after_step(self, parameters, frame, gradients, learning_rate):
                 pass
 
-        return {"nothing": None, "runless": Runless(run), "lost": Lost(run)}[self.made]
+        class Growing(Strategy):
+            def after_step(self, parameters, frame, gradients, learning_rate):
+                return parameters.selected(np.arange(2 * len(parameters)) // 2)
+
+        kinds = {"runless": Runless, "lost": Lost, "growing": Growing}
+        return kinds[self.made](run) if self.made in kinds else None
 
 
 @pytest.mark.parametrize(
@@ -235,6 +266,7 @@ class Forgetful(StrategySettings):
         ("nothing", r"Forgetful\.begin: gave None, wanted a Strategy"),
         ("runless", r"Forgetful\.begin: .* super\(\).__init__\(run\)"),
         ("lost", r"Lost\.after_step: gave None, wanted the Parameters"),
+        ("growing", r"step 1: Growing made 40 splats of 20, wanted at most 30"),
     ],
 )
 def test_a_strategy_that_gives_nothing_is_named(device, made, said):

@@ -7,8 +7,7 @@ off it, beside how densely the views sample each frequency.
 
 from __future__ import annotations
 
-import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -19,17 +18,13 @@ from paper.coordinate_network import torch_is_missing
 from paper.fits import fit_settings
 from paper.moments import start
 from paper.plan import Plan
-from paper.spectra import error_spectrum, ring_edges
+from paper.unseen_views import UnseenViews, field_moments, splat_moments
 from rift_cl import Device, coverage
 from rift_cl.commands.fit_photos.pictures import CapturePictures
-from rift_cl.commands.pictures.evenly_spaced import evenly
 from rift_cl.geometry import Camera
-from rift_cl.io import open_capture
-from rift_cl.metrics import psnr
 from rift_cl.report.html_page import Page
 from rift_cl.report.plot import curves, figure_svgs
 from rift_cl.sampling import Target
-from rift_cl.train import Trainer
 from rift_cl.train.start.points import focus_of
 
 NAME = "field_bias"
@@ -43,7 +38,6 @@ FIELDS = {
     "features 4": (4.0, False),
     "features 16": (16.0, False),
 }
-_SHARES = (1 / 4, 1 / 2, 1)
 _DIRECTIONS = 64
 # Steps of the fits that kernels are compiled by.
 _WARM = 12
@@ -63,7 +57,7 @@ def compute(plan: Plan, device: Device, kept: dict[str, Any]) -> Iterator[dict[s
     trainer, pictures = start(asked, device)
     means = device.get(trainer.parameters.drawn.means)
     box = means.min(axis=0), means.max(axis=0)
-    views = _Unseen(device, asked.test[1:], pictures, 12 if plan.full else 1)
+    views = UnseenViews(device, asked.test[1:], pictures, 12 if plan.full else 1)
     found: list[dict[str, Any]] = []
     result = {
         "frequency": views.frequency.tolist(),
@@ -76,14 +70,14 @@ def compute(plan: Plan, device: Device, kept: dict[str, Any]) -> Iterator[dict[s
     for model, exponent in SPLATS.items():
         if model not in runs:
             trainer, _ = start(fit_settings(plan, count, exponent=exponent, seed=seed), device)
-            runs[model] = {"model": model, "moments": list(_splats(trainer, views))}
+            runs[model] = {"model": model, "moments": list(splat_moments(trainer, views))}
         found.append(runs[model])
         yield result
     budget = found[0]["moments"][-1]["cpu_s"]
     for model, (sigma, ramp) in {} if torch_is_missing() else FIELDS.items():
         if model not in runs:
-            fit = _field_fit(plan, pictures, box, sigma, ramp)
-            runs[model] = {"model": model, "moments": list(_field(fit, budget, views))}
+            fit = field_fit(plan, pictures, box, sigma, ramp)
+            runs[model] = {"model": model, "moments": list(field_moments(fit, budget, views))}
         found.append(runs[model])
         yield result
 
@@ -100,71 +94,7 @@ def _warm(plan: Plan, count: int, device: Device) -> None:
     device.finish()
 
 
-class _Unseen:
-    """Photographs on the ring and off it that no model saw.
-
-    Args:
-        device: of the splats.
-        captures: on the ring, and off it.
-        like: the photographs that are trained on.
-        count: of each.
-    """
-
-    def __init__(
-        self, device: Device, captures: Sequence[Any], like: CapturePictures, count: int
-    ) -> None:
-        self.groups: dict[str, CapturePictures] = {}
-        for name, capture in zip(("ring", "off the ring"), captures, strict=True):
-            views = open_capture(capture).views
-            few = [views[k] for k in evenly(len(views), count)]
-            self.groups[name] = CapturePictures(device, few, like=like)
-        self.edges, self.frequency = ring_edges(self.groups["ring"].cameras[0].size)
-
-    def record(self, draw: Callable[[Camera], Floats]) -> dict[str, Any]:
-        """Mean PSNR and relative error by frequency of both groups."""
-        found = {}
-        for name, group in self.groups.items():
-            behind = group.behind
-            images = [group.shown(draw(camera)) for camera in group.cameras]
-            truths = [group.shown(group.over(k, behind)) for k in range(len(images))]
-            scores = [psnr(image, truth) for image, truth in zip(images, truths, strict=True)]
-            less = [[image - behind for image in part] for part in (images, truths)]
-            error, _ = error_spectrum(*less, self.edges)
-            found[name] = {"psnr": float(np.mean(scores)), "error": error.tolist()}
-        return found
-
-
-def _splats(trainer: Trainer, views: _Unseen) -> Iterator[dict[str, Any]]:
-    """The moments of a fit of splats."""
-    device, steps, seconds = trainer.device, trainer.settings.steps, 0.0
-    behind = device.array(views.groups["ring"].behind)
-
-    def draw(camera: Camera) -> Floats:
-        frame = trainer.renderer.forward(trainer.parameters.drawn, camera, background=behind)
-        return np.asarray(device.get(frame.image))
-
-    for share in _SHARES:
-        began = time.process_time()
-        while trainer.parameters.step < max(1, round(share * steps)):
-            trainer.step()
-        device.finish()
-        seconds += time.process_time() - began
-        yield {"step": trainer.parameters.step, "cpu_s": seconds, **views.record(draw)}
-
-
-def _field(fit: Any, budget: float, views: _Unseen) -> Iterator[dict[str, Any]]:
-    """The moments of a field, after shares of the time that it has."""
-    steps, seconds = 0, 0.0
-    for share in _SHARES:
-        while seconds < share * budget:
-            began = time.process_time()
-            fit.step()
-            seconds += time.process_time() - began
-            steps += 1
-        yield {"step": steps, "cpu_s": seconds, **views.record(fit.field.picture)}
-
-
-def _field_fit(
+def field_fit(
     plan: Plan,
     pictures: CapturePictures,
     box: tuple[Floats, Floats],
@@ -208,14 +138,14 @@ def show(page: Page, result: dict[str, Any]) -> None:
         "a bias is the shape of a curve, not its height."
     )
     words = "How densely the views sample a frequency, by coverage, over its highest."
-    _draw(page, {"coverage": (frequency, result["density"])}, "density", words, log_y=True)
+    draw_curves(page, {"coverage": (frequency, result["density"])}, "density", words, log_y=True)
     for group in ("ring", "off the ring"):
         series = {
             run["model"]: (frequency, 10 * np.log10(run["moments"][-1][group]["error"]))
             for run in runs
         }
         words = f"Relative error at the end of unseen photographs: {group}."
-        _draw(page, series, "error / truth, dB", words)
+        draw_curves(page, series, "error / truth, dB", words)
     rows = [
         (run["model"], m["step"], m["cpu_s"], m["ring"]["psnr"], m["off the ring"]["psnr"])
         for run in runs
@@ -231,9 +161,10 @@ def show(page: Page, result: dict[str, Any]) -> None:
     )
 
 
-def _draw(
+def draw_curves(
     page: Page, series: dict[str, tuple[Any, Any]], label: str, words: str, *, log_y: bool = False
 ) -> None:
+    """Draw series by frequency, with ``words`` below."""
     figure = figure_svgs(
         lambda width: curves(
             series,

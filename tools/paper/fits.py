@@ -49,7 +49,13 @@ class Fitted:
 
 
 def fit_settings(
-    plan: Plan, count: int, *, exponent: float = 0.0, seed: int, noise: float = 0.0
+    plan: Plan,
+    count: int,
+    *,
+    exponent: float = 0.0,
+    seed: int,
+    noise: float = 0.0,
+    preset: str = PRESET,
 ) -> FitPhotosSettings:
     """The settings of a fit to some of the ring's views; writes the captures it wants.
 
@@ -66,7 +72,7 @@ def fit_settings(
     name = f"fit_{plan.steps}_steps_{plan.splats}_splats_ramp_{exponent:g}_seed_{seed}{noisy}"
     return FitPhotosSettings.of(
         capture=write_capture(ring, choice.trained, place / f"trained{noisy}", noise=noise),
-        preset=PRESET,
+        preset=preset,
         test=(held_out, test, captures.off_path),
         out=place / name,
         steps=plan.steps,

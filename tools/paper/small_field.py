@@ -135,7 +135,7 @@ class SmallField(torch.nn.Module):
         """Densities (n,) per unit of length and colours (n, 3) of places and unit directions."""
         found = self.body(self.encoding((places - self.low) / (self.high - self.low)))
         density = functional.softplus(found[:, 0] + _SHIFT)
-        color = self.color(torch.cat([found[:, 1:], _second_degree(ways)], dim=1))
+        color = self.color(torch.cat([found[:, 1:], second_degree(ways)], dim=1))
         return density / (self.high - self.low).max() * self.size.samples, torch.sigmoid(color)
 
     def rays(self, origins: Any, ways: Any, random: torch.Generator | None = None) -> Any:
@@ -184,7 +184,7 @@ def camera_rays(camera: Camera, rows: slice, columns: slice) -> tuple[Any, Any]:
     return torch.tensor(camera.center, dtype=torch.float32).expand(way.shape), way
 
 
-def _second_degree(ways: Any) -> Any:
+def second_degree(ways: Any) -> Any:
     """(n, 9): the functions of a direction to the second degree."""
     x, y, z = ways.unbind(dim=1)
     return torch.stack(

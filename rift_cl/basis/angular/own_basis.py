@@ -31,8 +31,8 @@ def check_own_basis(name: str, basis: AngularBasis, n_linear: int) -> None:
 
     Raises:
         InputError: it has another number of functions or no geometry, arrays of other shapes,
-            values that are not finite, another first function than the constant, or slopes that
-            are not those of its functions.
+            values that are not finite, functions that start as zero or as one another, another
+            first function than the constant, or slopes that are not those of its functions.
     """
     said = f"angular basis {name!r}"
     if basis.n_linear != n_linear or not basis.n_geometry >= 1:
@@ -43,6 +43,7 @@ def check_own_basis(name: str, basis: AngularBasis, n_linear: int) -> None:
     random = np.random.default_rng(0)
     axes, directions = random.normal(size=(2, _POINTS, 3))
     geometry = _array(f"{said}: start_geometry", basis.start_geometry(axes), basis.n_geometry)
+    _check_start(said, _slopes(said, basis, geometry, directions).values)
     geometry = geometry + 0.01 * random.normal(size=geometry.shape)
     slopes = _slopes(said, basis, geometry, directions)
     if not np.allclose(slopes.values[:, 0], CONSTANT):
@@ -58,6 +59,27 @@ def check_own_basis(name: str, basis: AngularBasis, n_linear: int) -> None:
         step = _STEP * np.eye(3)[axis]
         either = [_slopes(said, basis, geometry, directions + s * step).values for s in (1, -1)]
         _compare(f"{said}: by_directions[..., {axis}]", slopes.by_directions[..., axis], either)
+
+
+def _check_start(said: str, values: Floats) -> None:
+    """Refuse functions that a fit cannot tell apart, or that it cannot move away from zero.
+
+    Coefficients are zero at first, so that the slope by a geometry is, too; and that by a
+    coefficient is the function itself.
+    """
+    zero = np.flatnonzero(~values.any(axis=0))
+    if zero.size:
+        raise InputError(
+            f"{said}: function {zero[0]} is 0 everywhere where start_geometry puts it, and nothing "
+            "that a fit learns would move it from there: start it elsewhere"
+        )
+    for number in range(1, values.shape[1]):
+        same = np.flatnonzero(np.isclose(values[:, :number], values[:, [number]]).all(axis=0))
+        if same.size:
+            raise InputError(
+                f"{said}: functions {same[0]} and {number} are the same where start_geometry puts "
+                "them, and would stay so in a fit: start them apart"
+            )
 
 
 def _slopes(said: str, basis: AngularBasis, geometry: Floats, directions: Floats) -> Slopes:

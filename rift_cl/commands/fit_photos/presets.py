@@ -13,11 +13,8 @@ from typing import Any
 PRESETS: Mapping[str, Mapping[str, Any]] = {
     # Eight spherical Gaussians each: higher scores in a longer time, for viewers that know them.
     "lobes": {"angular": "sg", "modes": 8},
-    # Surfaces nearer to where they are, at some loss of the photographs: priors on splats' shapes.
-    "surface": {
-        "surface.flatness": 0.03,
-        "surface.normal_consistency": 0.01,
-    },
+    # Depth and normals nearer to the surface, at some loss of the photographs.
+    "surface": {"surface.normal_consistency": 0.03},
     # The defaults of version 0.1.0, whose degrees of harmonics joined every 500 steps.
     "0.1": {
         "sh_every": 1 / 6,

@@ -11,6 +11,7 @@ that lies beyond the detector, which is small and not zero.
 from __future__ import annotations
 
 import math
+import warnings
 from bisect import bisect_left
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
@@ -202,6 +203,12 @@ class Response:
                 f"cycles per unit of length, {wanted}"
             )
         return values.astype(np.float64)
+
+
+def warn_of_doubt(filter: Filter, scan: Parallel) -> None:
+    """Warn whoever called the caller of what speaks against a response; see ``Response.doubt``."""
+    if isinstance(filter, Response) and (doubt := filter.doubt(scan.bins, scan.pitch)):
+        warnings.warn(doubt, stacklevel=3)
 
 
 @dataclass(frozen=True)

@@ -41,6 +41,7 @@ from rift_cl.operators.filters.ramp_filters import (
     Finer,
     ViewFilter,
     as_filter,
+    warn_of_doubt,
 )
 from rift_cl.operators.linear import Chunk, LinearOperator
 from rift_cl.operators.projector.cone.rectification import Rectification
@@ -80,6 +81,7 @@ class FDK(Composite):
         super().__init__(A.range, A.domain, A.device, A.dtype)
         self._given, self._compensate, self.filter = A, compensate, as_filter(filter)
         scan, reading = _circle(A)
+        warn_of_doubt(self.filter, at_axis(scan))
         counted = redundancy(scan, compensate)
         before, after = counted.missing
         wide = wider(scan, before, after)

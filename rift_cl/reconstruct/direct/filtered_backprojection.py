@@ -13,7 +13,6 @@ each view gets a filter of its own (rift_cl/operators/filters/compensation.py).
 from __future__ import annotations
 
 import math
-import warnings
 from collections.abc import Iterable, Iterator
 from functools import partial
 from typing import Any
@@ -31,9 +30,9 @@ from rift_cl.operators.filters.compensation import Compensation
 from rift_cl.operators.filters.ramp_filters import (
     FilterLike,
     Gains,
-    Response,
     ViewFilter,
     as_filter,
+    warn_of_doubt,
 )
 from rift_cl.operators.linear import Chunk
 from rift_cl.operators.projector.parallel.parallel_projector import ParallelProjector
@@ -87,8 +86,7 @@ class FilteredBackprojection(Composite):
         if not size > 0:
             raise InputError(f"diameter is {diameter!r}, wanted the object's, a positive length")
         chosen = as_filter(filter)
-        if isinstance(chosen, Response) and (doubt := chosen.doubt(A.scan.bins, A.scan.pitch)):
-            warnings.warn(doubt, stacklevel=2)
+        warn_of_doubt(chosen, A.scan)
         self._filter = ViewFilter(
             A.scan,
             chosen,

@@ -2,7 +2,7 @@
 
 Its two expressions are evaluated at some differences of a pixel: both are to be finite, and the
 gradient is to be the slope of the value, unless it is said to stand for another one. A sign that is
-wrong would otherwise end in a fit that is merely bad.
+wrong would otherwise end in a fit that is merely bad. Nor may a loss fall as images differ more.
 """
 
 from __future__ import annotations
@@ -32,8 +32,8 @@ def check_own_loss(device: Device, name: str) -> None:
     """Check a loss by its name; those of the package pass unseen.
 
     Raises:
-        InputError: it does not compile, gives NaN or infinity, has no gradient at all, or one
-            that is not the slope of its value.
+        InputError: it does not compile, gives NaN or infinity, has no gradient at all, one that
+            points away from the images, or one that is not the slope of its value.
     """
     if name in OURS:
         return
@@ -68,6 +68,12 @@ def check_own_loss(device: Device, name: str) -> None:
             f"pixel loss {name!r}: at d = {_AT[at]:g} the gradient is {slopes[at]:.4g} and the "
             f"slope of the value {differences[at]:.4g}; if it is meant to be another, say "
             "PixelLoss(..., surrogate=True)"
+        )
+    if ((slopes * _AT) < 0).sum() > _EDGES:
+        raise InputError(
+            f"pixel loss {name!r}: its gradient at d = {_AT[-1]:g} is {slopes[-1]:.4g} and at d = "
+            f"{_AT[0]:g} {slopes[0]:.4g}: it falls as images differ more, so that a fit would move "
+            "away from them"
         )
 
 

@@ -6,10 +6,13 @@ so one of a user's own is as fast as those of the package.
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
 
 from rift_cl.errors import InputError
 from rift_cl.registry import Registry
+
+_SPACE, _WORD, _SIGNS = re.compile(r"\s+"), re.compile(r"\w"), "+-&|<>=!*/"
 
 
 @dataclass(frozen=True)
@@ -45,7 +48,15 @@ class PixelLoss:
     def macros(self) -> dict[str, str]:
         """The expressions as compile-time constants, without spaces: drivers split at them."""
         expressions = {"PIXEL_LOSS": self.value, "PIXEL_GRADIENT": self.gradient}
-        return {name: "".join(text.split()) for name, text in expressions.items()}
+        return {name: _SPACE.sub(_without_space, text) for name, text in expressions.items()}
+
+
+def _without_space(space: re.Match[str]) -> str:
+    """Nothing, or a comment where two parts would become another, as in ``a - -b``."""
+    before, after = space.string[: space.start()][-1:], space.string[space.end() :][:1]
+    words = _WORD.match(before) and _WORD.match(after)
+    signs = before and after and before in _SIGNS and after in _SIGNS
+    return "/**/" if words or signs else ""
 
 
 PIXEL_LOSSES = Registry(
