@@ -104,6 +104,18 @@ class Camera:
         """Columns of the image."""
         return self.size[1]
 
+    def shrunk(self, factor: int) -> Camera:
+        """The camera of the same image with blocks of ``factor`` x ``factor`` pixels made one.
+
+        Rows and columns at the lower and right edge that fill no block are left out.
+
+        Raises:
+            ShapeError: a side has no whole block.
+        """
+        K = self.K / [[factor], [factor], [1]]
+        size = (self.height // factor, self.width // factor)
+        return Camera(size, K, self.view, self.model, self.aperture)
+
     @property
     def intrinsics(self) -> tuple[float, float, float, float]:
         """The numbers of ``K``: fx, fy, cx, cy in pixels."""

@@ -1,7 +1,7 @@
 """A step of training by its definitions.
 
 Coincident of adam, splat_update, splat_activate, splat_band, splat_band_coverage, splat_noise,
-splat_statistics, residual_image and residual_statistics.
+splat_statistics, residual_image, residual_statistics and image_shrink.
 """
 
 from __future__ import annotations
@@ -186,6 +186,24 @@ def residual_statistics(before: Floats, shown: Floats, culled: NDArray[np.uint8]
     counts = ~np.isin(culled, (1, 4)) & np.isfinite(shown.sum(axis=1))
     after = before + np.append(shown, np.ones((len(shown), 1)), axis=1)
     return np.where(counts[:, None], after, before)
+
+
+def image_shrink(
+    image: Floats, factor: int, weights: Floats | None = None
+) -> tuple[Floats, Floats]:
+    """Weighted means of blocks of ``factor`` x ``factor`` pixels, and the means of the weights."""
+    rows, columns = (side // factor for side in image.shape[:2])
+    counts = np.ones(image.shape[:2]) if weights is None else weights
+
+    def blocks(array: Floats) -> Floats:
+        whole = array[: rows * factor, : columns * factor]
+        return whole.reshape(rows, factor, columns, factor, *array.shape[2:])
+
+    share = blocks(counts).mean(axis=(1, 3))
+    means = blocks(image * counts[..., None]).mean(axis=(1, 3))
+    plain = blocks(image).mean(axis=(1, 3))
+    known = share[..., None] > 0
+    return np.where(known, means / np.where(known, share[..., None], 1), plain), share
 
 
 def _turned(x: Floats, w: Floats, v: Floats) -> Floats:

@@ -17,6 +17,7 @@ from rift_cl.train.basis_settings import AngularSettings, BasisSettings
 from rift_cl.train.environment_settings import EnvironmentSettings
 from rift_cl.train.loss.homogenisation import Homogenisation
 from rift_cl.train.loss.pixel_loss import PIXEL_LOSSES
+from rift_cl.train.octave_settings import OctaveSettings
 from rift_cl.train.ranges import check_number, check_registered, check_whole
 from rift_cl.train.strategy import STRATEGIES, DefaultSettings, ResidualSettings, StrategySettings
 from rift_cl.train.surface_settings import SurfaceSettings
@@ -148,6 +149,8 @@ class TrainSettings:
     place of all harmonics but the constant one."""
     environment: ShortSplats[EnvironmentSettings] = field(default_factory=EnvironmentSettings)
     """A light that all splats share and reflect."""
+    octaves: Short[OctaveSettings] = field(default_factory=OctaveSettings)
+    """How often images are halved at first."""
     surface: ShortSplats[SurfaceSettings] = field(default_factory=SurfaceSettings)
     """Priors that make splats lie on surfaces."""
     strategy: ShortExpert[StrategySettings] = field(

@@ -61,6 +61,12 @@ _PER_VIEW: Mapping[str, Mapping[str, tuple[int, ...]]] = {
 }
 # Infinity until the first square of a residual is known.
 _LOSS = Field((), "f8", 0, finite=False)
+_OCTAVES = {
+    "octaves.level": Field((), "i8", 0),
+    "octaves.ended": Field(("octaves",), "i8", -1),
+    "octaves.mean_square": _LOSS,
+    "octaves.looks": Field((), "i8", 0),
+}
 
 
 def check_state(state: Arrays, *, views: int) -> None:
@@ -104,6 +110,8 @@ def _schema(state: Arrays, views: int) -> dict[str, Field]:
             for key, shape in shapes.items():
                 least = 0 if key == "second" else -np.inf
                 fields[f"{name}.{key}"] = Field((views, *shape), "f8", least)
+    if any(key.startswith("octaves.") for key in state):
+        fields |= _OCTAVES
     return {**fields, "loss.mean_square": _LOSS, "loss.noise": _LOSS}
 
 

@@ -13,7 +13,9 @@ any two steps, is all that a run needs to go on to the same bits.
 from __future__ import annotations
 
 import math
+import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import replace
 from functools import lru_cache
 from typing import Any, Protocol, final
 
@@ -33,6 +35,7 @@ from rift_cl.train.loss.homogenised_loss import HomogenisedLoss
 from rift_cl.train.loss.own_loss import check_own_loss
 from rift_cl.train.parameters import Environment, Parameters
 from rift_cl.train.per_view.exposures import Exposures
+from rift_cl.train.per_view.octaves import Octaves
 from rift_cl.train.per_view.poses import Poses
 from rift_cl.train.schedules import CoefficientSchedule, LearningRateSchedule
 from rift_cl.train.settings import TrainSettings
@@ -109,6 +112,8 @@ class Trainer:
         self.pictures = pictures
         self.parameters = parameters
         settings = settings.decided(len(pictures.cameras))
+        octaves = settings.octaves.decided(pictures.cameras)
+        settings = replace(settings, octaves=octaves)
         self.settings = settings
         self.flat = flat
         settings.solve.check_heed(self.solves)
@@ -132,6 +137,9 @@ class Trainer:
         self._add_coefficients()
         self.poses = Poses(pictures.cameras, extent) if settings.refine_poses else None
         self.exposures = Exposures(self.device, views) if settings.refine_exposures else None
+        self.octaves = None
+        if octaves.count:
+            self.octaves = Octaves(self.device, pictures, octaves, settings.steps)
         self.loss = HomogenisedLoss(
             self.device,
             settings.homogenisation,
@@ -167,7 +175,7 @@ class Trainer:
                 self._check_finite(loss)
                 values = {"loss": loss, "splats": float(len(self.parameters))}
                 if done == total:
-                    self._check_finite_splats(self.parameters.host()[0])
+                    self._warn_of_lost()
                 yield Report(done, total, "steps", values, (worked, worked + self._work_left()))
             if stop:
                 return
@@ -180,16 +188,17 @@ class Trainer:
                 "finite; checkpoints from before are kept"
             )
 
-    def _check_finite_splats(self, raw: Group) -> None:
-        """Refuse to go on with splats that no image shows and no loss tells of."""
+    def _warn_of_lost(self) -> None:
+        """Say how many splats no image shows and no loss tells of."""
         lost = np.zeros(len(self.parameters), bool)
-        for array in raw.values():
+        for array in self.parameters.host()[0].values():
             lost |= ~np.isfinite(array).reshape(len(lost), -1).all(axis=1)
         if lost.any():
-            raise NonFiniteError(
-                f"{lost.sum()} of {len(lost)} splats hold NaN or infinity after step "
-                f"{self.parameters.step}, usually by learning rates that are too high or by a loss "
-                "or strategy of one's own; checkpoints from before are kept"
+            warnings.warn(
+                f"{lost.sum()} of {len(lost)} splats hold NaN or infinity after the last step and "
+                "are not drawn, usually by learning rates that are too high or by a loss or "
+                "strategy of one's own",
+                stacklevel=3,
             )
 
     @final
@@ -211,8 +220,11 @@ class Trainer:
         step = parameters.step
         number, rates = self.view_at(step), self.schedule.learning_rates(step)
         self.pictures.begin(step)
+        camera = self.camera(number)
         frame = self.renderer.forward(
-            parameters.drawn, self.camera(number), background=self.pictures.background(number)
+            parameters.drawn,
+            camera if self.octaves is None else self.octaves.camera(camera),
+            background=self.pictures.background(number),
         )
         value, by_image = self._compared(frame, number, rates["exposures"])
         shares = settings.learning_rates
@@ -301,14 +313,9 @@ class Trainer:
         return self.pictures.cameras[number] if self.poses is None else self.poses.camera(number)
 
     def state(self) -> dict[str, NDArray[Any]]:
-        """All that changes from step to step, as host arrays by name.
-
-        Raises:
-            NonFiniteError: splats hold NaN or infinity.
-        """
+        """All that changes from step to step, as host arrays by name."""
         parameters = self.parameters
         raw, first, second = parameters.host()
-        self._check_finite_splats(raw)
         groups: dict[str, Group] = {
             "raw": raw,
             "first": first,
@@ -322,10 +329,14 @@ class Trainer:
             groups["sheet"] = {"normals": self.device.get(parameters.sheet)}
         if parameters.band is not None:
             groups["band"] = {"lengths": self.device.get(parameters.band)}
-        for name, refined in (("poses", self.poses), ("exposures", self.exposures)):
-            if refined is not None:
-                groups[name] = refined.state()
+        for name, part in self._parts().items():
+            groups[name] = part.state()
         return {"step": np.array(parameters.step), **_flattened(groups)}
+
+    def _parts(self) -> dict[str, Any]:
+        """What a run has besides splats, strategy and loss, by its name in a state."""
+        parts = {"poses": self.poses, "exposures": self.exposures, "octaves": self.octaves}
+        return {name: part for name, part in parts.items() if part is not None}
 
     def restore(self, state: Mapping[str, NDArray[Any]]) -> None:
         """Go on from a state of a run with the same settings and views.
@@ -353,9 +364,10 @@ class Trainer:
             self._update_renderer()
             self.strategy.restore(groups.get("strategy", {}))
             self.loss.restore(groups["loss"])
-            for name, refined in (("poses", self.poses), ("exposures", self.exposures)):
-                if refined is not None:
-                    refined.restore(groups[name])
+            if (self.octaves is None) == ("octaves" in groups):
+                raise CheckpointError("the checkpoint is of another run: one has octaves")
+            for name, part in self._parts().items():
+                part.restore(groups[name])
         except (KeyError, ShapeError) as error:
             raise CheckpointError(f"the checkpoint is of another run ({error})") from error
 
@@ -376,12 +388,16 @@ class Trainer:
         """The loss of a rendered image and its gradient."""
         pictures, exposures, image = self.pictures, self.exposures, frame.image
         target, weights = pictures.target(number), pictures.weights(number)
+        if self.octaves is not None:
+            target, weights = self.octaves.sized(target, weights)
         exposed = image if exposures is None else exposures.applied(image, number)
         value, by_exposed = self.loss(exposed, target, weights=weights, view=number)
         if (self.parameters.step + 1) % REPORT_EVERY == 0:
             self.loss.watch(exposed, target, weights=weights)
         if self.strategy.looks_at(self.parameters.step):
             self.strategy.look(frame, exposed, target, weights)
+        if self.octaves is not None:
+            self.octaves.after_step(self.parameters.step + 1, exposed, target, weights)
         if exposures is None:
             return value, by_exposed
         return value, exposures.pulled_back(image, by_exposed, number, rate)

@@ -206,16 +206,13 @@ def test_a_fit_that_diverges_stops_where_it_is_seen(device, monkeypatch):
         list(trainer.run())
 
 
-def test_splats_that_are_lost_to_nan_end_a_fit(device):
+def test_splats_that_are_lost_to_nan_are_told_of(device):
     """No image shows them, so that no loss tells of them."""
     trainer = _trainer(device, Still())
-    before = trainer.state()["raw.means"]
-    broken = before.copy()
+    broken = trainer.state()["raw.means"]
     broken[7, 1] = np.nan
     trainer.parameters.raw["means"].set(broken)
-    with pytest.raises(NonFiniteError, match="1 of 20 splats hold NaN or infinity after step 0"):
-        trainer.state()
-    with pytest.raises(NonFiniteError, match=r"1 of 20 splats .* after step 2"):
+    with pytest.warns(UserWarning, match="1 of 20 splats hold NaN or infinity after the last"):
         list(trainer.run())
 
 

@@ -82,9 +82,7 @@ def camera_at(view: View, downscale: int) -> Camera:
             f"downscale is {downscale!r}, wanted a whole number from 1 to {min(camera.size)}, "
             f"the shorter edge of view {view.name!r}"
         )
-    K = camera.K / [[factor], [factor], [1]]
-    size = (camera.height // int(factor), camera.width // int(factor))
-    return Camera(size, K, camera.view, camera.model, camera.aperture)
+    return camera.shrunk(int(factor))
 
 
 def as_pinholes(capture: Capture) -> Capture:

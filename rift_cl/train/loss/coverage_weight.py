@@ -64,11 +64,17 @@ class CoverageWeight:
         self._target = Target(focus_of(cameras), field_diameter(cameras))
         self._tables: dict[int, NDArray[np.float32]] = {}
 
-    def response(self, view: int, exponent: float) -> Response:
-        """The weight of a view's image frequencies, in cycles per pixel."""
+    def response(self, view: int, exponent: float, height: int | None = None) -> Response:
+        """The weight of a view's image frequencies, in cycles per pixel.
+
+        ``height`` is that of an image which was made smaller by a whole factor.
+        """
         table, diminishing_returns = self._table(view), self._diminishing_returns(view)
+        full = self._cameras[view].height
+        factor = round(full / (height or full))
 
         def weight(ky: Floats, kx: Floats) -> Floats:
+            ky, kx = ky / factor, kx / factor
             radius = np.arcsinh(np.hypot(ky, kx) / diminishing_returns) / np.arcsinh(
                 _LARGEST / diminishing_returns
             )

@@ -134,5 +134,5 @@ class HomogenisedLoss:
 
     def _response(self, size: tuple[int, ...], exponent: float, view: int) -> Response:
         if self.coverage is not None:
-            return self.coverage.response(view, exponent)
+            return self.coverage.response(view, exponent, size[0])
         return partial(self.settings.response, longest=max(size), exponent=exponent)

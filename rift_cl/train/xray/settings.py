@@ -14,6 +14,7 @@ from rift_cl.splat.settings import Activation
 from rift_cl.train.basis_settings import AngularSettings, BasisSettings
 from rift_cl.train.environment_settings import EnvironmentSettings
 from rift_cl.train.loss.homogenisation import Homogenisation
+from rift_cl.train.octave_settings import OctaveSettings
 from rift_cl.train.settings import LearningRates, TrainSettings
 from rift_cl.train.strategy import StrategySettings, XraySettings
 from rift_cl.train.surface_settings import SurfaceSettings
@@ -68,6 +69,7 @@ class XrayTrainSettings(TrainSettings):
     basis: ShortSplats[BasisSettings] = field(default_factory=XrayBasisSettings)
     angular: NoOption[AngularSettings] = field(default_factory=AngularSettings)
     environment: NoOption[EnvironmentSettings] = field(default_factory=EnvironmentSettings)
+    octaves: NoOption[OctaveSettings] = field(default_factory=lambda: OctaveSettings(0))
     surface: NoOption[SurfaceSettings] = field(default_factory=SurfaceSettings)
     strategy: ShortExpert[StrategySettings] = field(default_factory=XraySettings)
     # Orbits are dense along the detector's rows, and along nothing else.
