@@ -19,9 +19,8 @@ from rift_cl.geometry import Camera
 from rift_cl.option_marks import Expert
 from rift_cl.train.ranges import check_number, check_whole
 
-# Pixels of an image from which on it is halved at first, and of the smallest that it is halved to;
-# measured on a capture of 0.6 megapixels, and in vain on one of 0.04.
-_LARGE, _SMALLEST = 100_000, 8_000
+# Pixels of an image from which on it is halved at first, and of the smallest that it is halved to.
+_LARGE, _SMALLEST = 250_000, 8_000
 # Pixels along the shorter side of the smallest: SSIM wants a window of 11.
 _SHORTEST = 16
 
@@ -39,7 +38,7 @@ class OctaveSettings:
     )
     """Number of times that images are halved at first, each of which leaves out an octave of
     their frequencies until the residual is smaller than what that octave holds (0 = full size from
-    the first step on). Default: as many as leave 8,000 pixels, of images above 100,000."""
+    the first step on). Default: as many as leave 8,000 pixels, of images above 250,000."""
     last: Expert[float] = 0.4
     """Fraction of the run after which images have their full size at the latest; images that are
     halved twice end after half of that, and so on."""

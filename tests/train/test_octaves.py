@@ -69,7 +69,7 @@ def test_powers_are_those_of_the_octaves(device):
 
 @pytest.mark.parametrize(
     ("size", "count"),
-    [((168, 224), 0), ((480, 270), 2), ((672, 896), 3), ((20, 8000), 0), ((2000, 3000), 4)],
+    [((168, 224), 0), ((480, 270), 0), ((672, 896), 3), ((20, 8000), 0), ((2000, 3000), 4)],
 )
 def test_large_images_are_halved_by_default(size, count):
     assert OctaveSettings().decided([camera(*size)]).count == count
@@ -77,7 +77,7 @@ def test_large_images_are_halved_by_default(size, count):
 
 
 def test_images_are_not_halved_to_nothing():
-    with pytest.raises(SettingError, match="octaves|count is 3, which leaves 8 pixels"):
+    with pytest.raises(SettingError, match="count is 3, which leaves 8 pixels"):
         OctaveSettings(3).decided([camera(500, 500), camera(64, 90)])
 
 

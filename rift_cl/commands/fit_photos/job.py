@@ -19,6 +19,7 @@ from rift_cl.commands.fit_photos.report import (
     brightness_notes,
     fit_page,
     history_notes,
+    octave_notes,
     ramp_notes,
 )
 from rift_cl.commands.fit_photos.scores import error_record, score_record, score_views
@@ -215,6 +216,7 @@ class Fit(FitRun[FitPhotosSettings]):
             "history": self._history,
             "background": pictures.behind.tolist(),
             **settings.basis_facts(),
+            **({} if trainer.octaves is None else {"octaves": trainer.octaves.facts()}),
             **score_record(self.scores),
             **error_record(self.scores),
         }
@@ -222,7 +224,8 @@ class Fit(FitRun[FitPhotosSettings]):
         brightness = brightness_notes(settings, self.scores.get("held out", []))
         for note in brightness:
             self.announce(f"rift: {note}")
-        notes = [*self._notes(), *ramp, *history_notes(self._history), *brightness]
+        octaves = octave_notes(self.metrics)
+        notes = [*self._notes(), *octaves, *ramp, *history_notes(self._history), *brightness]
         scene = leave_page(settings.out, pictures, self.announce)
         name = capture_name(settings.capture)
         page = fit_page(name, self.scores, self.losses, self.metrics, notes, scene)

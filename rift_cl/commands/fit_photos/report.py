@@ -87,6 +87,20 @@ def history_notes(history: Sequence[tuple[int, int]]) -> list[str]:
     return [f"It was trained {', then '.join(stages)}."]
 
 
+def octave_notes(metrics: Mapping[str, Any]) -> list[str]:
+    """A sentence about photographs that were halved at first."""
+    if "octaves" not in metrics:
+        return []
+    ended = metrics["octaves"]["ended"]
+    times = "once" if len(ended) == 1 else f"{len(ended)} times"
+    steps = " and ".join(str(step) for step in reversed(ended))
+    return [
+        f"The photographs were halved {times} at first, until the residual was smaller than what "
+        f"the halving leaves out: the size changed after step {steps}, and so does the scale of "
+        "the loss (--octaves)."
+    ]
+
+
 def brightness_notes(settings: FitPhotosSettings, scores: Sequence[ViewScore]) -> list[str]:
     """A sentence about exposures that change, where they were not fitted."""
     spread = brightness_spread(scores)

@@ -136,14 +136,16 @@ def doubted_center(found: AxisEstimate, given: float) -> list[str]:
 
 
 def doubted_circle(scan: ScanFile, given: float, device: Device | None = None) -> list[str]:
-    """What the data of a fan or a cone have against an axis that was given; empty where nothing.
+    """What the data of a fan or a cone have against their geometry and an axis that was given.
 
     Data that cannot be read here, or do not tell the axis, have nothing against one.
     """
     try:
-        return doubted_center(find_axis(scan, device), given)
+        found = find_axis(scan, device)
     except RiftError:
         return []
+    doubts = [f"Doubt: {found.doubt}."] if found.doubt else []
+    return doubts + doubted_center(found, given)
 
 
 def doubted_vectors(scan: ScanFile, vectors: Vectors) -> tuple[str, ...]:

@@ -18,6 +18,7 @@ from rift_cl.reconstruct.axis.estimate import AxisEstimate
 from rift_cl.reconstruct.axis.measures import RowAxis, chosen_measure
 from rift_cl.reconstruct.axis.repeated import repeated_angles
 from rift_cl.reconstruct.axis.turn import other_turn
+from rift_cl.reconstruct.axis.view_order import order_doubt
 from rift_cl.reconstruct.axis.views import Views, without_rings
 
 Floats = NDArray[np.float64]
@@ -102,7 +103,7 @@ def angle_doubt(views: Views, angles: Floats) -> str:
         The end of a sentence.
     """
     found = repeated_angles(views, angles) or other_turn(views, angles)
-    return "" if found is None else found.in_words()
+    return order_doubt(views, angles) or ("" if found is None else found.in_words())
 
 
 def _scatter_doubt(found: AxisEstimate) -> str:

@@ -85,6 +85,14 @@ class Octaves:
             self.ended[self.level] = step
             self._mean_square, self._looks = float("inf"), 0
 
+    def facts(self) -> dict[str, Any]:
+        """What happened, for a report: JSON."""
+        return {
+            "halvings": len(self.ended),
+            "left_out": self.powers.tolist(),
+            "ended": self.ended.tolist(),
+        }
+
     def state(self) -> dict[str, NDArray[Any]]:
         """What a checkpoint keeps."""
         return {
