@@ -48,10 +48,11 @@ from rift_cl.train.surface_settings import SurfacePenalties
 REPORT_EVERY = 25
 # Steps after which the limit of splats' bands, and normals of reflecting splats, are set anew.
 _BAND_EVERY = _NORMALS_EVERY = 100
-# What a step costs beside its splats, what harmonics of degree 1 add to a splat, and what each
-# further degree adds, all in the cost of as many splats of one color as there may be. Fitted to the
-# times of steps on PoCL (``tools/time_left.py``).
-_PIXELS, _FIRST_DEGREE, _NEXT_DEGREE = 0.6, 0.5, 0.25
+# What a step costs beside its splats, and what it does for a pixel of each splat that there may be;
+# what harmonics of degree 1 add to a splat, and what each further degree adds, all in the cost of
+# as many splats of one color as there may be. Fitted to the times of steps on PoCL
+# (``tools/time_left.py``).
+_STEP, _PIXEL, _FIRST_DEGREE, _NEXT_DEGREE = 0.5, 0.1, 0.5, 0.25
 # Splats begin large, so each covers more pixels: what the first step costs more, as a share, and
 # how much of that is left one step later. Fitted to the same times.
 _LARGE, _SHRINK = 0.75, math.exp(-1 / 60)
@@ -121,6 +122,7 @@ class Trainer:
         check_own_loss(self.device, settings.loss)
         self.schedule = LearningRateSchedule(settings, scene_extent(pictures.cameras))
         extent, views = self.schedule.extent, len(pictures.cameras)
+        self._mean_pixels = sum(math.prod(camera.size) for camera in pictures.cameras) / views
         run = TrainingRun(
             settings.steps, settings.splats, settings.seed, extent, self.schedule.cooldown
         )
@@ -167,7 +169,8 @@ class Trainer:
         """
         total, worked = self.settings.steps, 0.0
         while self.parameters.step < total:
-            worked += self._work(self.parameters.step, len(self.parameters))
+            level = 0 if self.octaves is None else self.octaves.level
+            worked += self._work(self.parameters.step, len(self.parameters), level=level)
             value, stop = self.step(), stopped()
             done = self.parameters.step
             if done % REPORT_EVERY == 0 or done == total or stop:
@@ -284,16 +287,20 @@ class Trainer:
             return SurfacePenalties()
         return self.settings.surface.at(step / self.settings.steps)
 
-    def _work(self, step: int, splats: int, steps: int = 1) -> float:
-        """Cost of steps, in units of one step with all splats of one color each."""
+    def _work(self, step: int, splats: int, steps: int = 1, level: int = 0) -> float:
+        """Cost of steps, in units of one step with all splats of one color each.
+
+        Images are halved ``level`` times.
+        """
         degree = sum(step >= joins for joins in self.settings.degree_joins)
         harmonics = _FIRST_DEGREE + _NEXT_DEGREE * (degree - 1) if degree else 0.0
-        one = _PIXELS + splats / self.settings.splats * (1 + harmonics)
+        pixels = self._mean_pixels / self.settings.splats * 0.25**level
+        one = _STEP + _PIXEL * pixels + splats / self.settings.splats * (1 + harmonics)
         large = _LARGE * _SHRINK**step * (1 - _SHRINK**steps) / (1 - _SHRINK)
         return one * (steps + large)
 
     def _work_left(self) -> float:
-        """The cost of all steps to come."""
+        """The cost of all steps to come, as if no image were halved any more."""
         step, left = self.parameters.step, 0.0
         joins = self.settings.degree_joins
         for steps, count in self.strategy.forecast(step, len(self.parameters)):

@@ -60,15 +60,18 @@ def test_the_numbers_of_splats_are_forecast_to_the_last(device):
 def test_reports_say_how_much_work_is_done_and_left(device, degree):
     _, reports, counts = trained(device, sh_degree=degree, sh_every=50 / 120)
     work = np.cumsum(
-        [cost(step, count / 80, min(step // 50, degree)) for step, count in enumerate(counts)]
+        [
+            cost(step, count / 80, min(step // 50, degree), 0.5 + 0.1 * 60)
+            for step, count in enumerate(counts)
+        ]
     )
     for report in reports:
         assert report.work == pytest.approx((work[report.done - 1], work[-1]))
 
 
-def cost(step, share, degree):
+def cost(step, share, degree, pixels=0.6):
     """Of a step with a share of all splats and harmonics of a degree, as the trainer takes it."""
-    return (0.6 + share * (1 + [0, 0.5, 0.75, 1.0][degree])) * (1 + 0.75 * np.exp(-step / 60))
+    return (pixels + share * (1 + [0, 0.5, 0.75, 1.0][degree])) * (1 + 0.75 * np.exp(-step / 60))
 
 
 @pytest.mark.parametrize("large, shrunk", [(0.5, 60), (0.75, 60), (1.0, 60)])

@@ -19,6 +19,7 @@ from rift_cl.train import Homogenisation, ImageLoss, Parameters
 from rift_cl.train.band_limit import Detail, camera_table
 from rift_cl.train.loss.homogenised_loss import HomogenisedLoss
 from rift_cl.train.per_view.exposures import Exposures
+from rift_cl.train.per_view.octaves import shrunk
 from rift_cl.train.strategy.residual import Contributions
 from rift_cl.train.strategy.screen_statistics import ScreenStatistics
 
@@ -64,6 +65,7 @@ def training_operations(case: SplatCase) -> dict[str, Callable[[], Any]]:
         "update": update,
         "statistics": lambda: statistics.add(case.frame, case.gradients),
         "contributions": lambda: contributions.add(case.frame, case.frame.image, target, None),
+        "halved image": lambda: shrunk(device, target, None, 2),
         "homogenised loss": lambda: homogenised(case.frame.image, target),
         "band limit": lambda: limited.limit_band(cameras, near=0.01, unseen=1.0),
         "band limit by coverage": lambda: limited.limit_band(
@@ -119,6 +121,7 @@ TRAINING_COSTS: dict[str, Cost] = {
         "splat", _splats, 41, "gradient, extents, code in; statistics both", 8
     ),
     "residual_image": _per("sample", _samples, 12, "two images in, residual out", 3),
+    "image_shrink": _per("sample", _samples, 5, "image in, a quarter of it out", 2),
     "residual_statistics": _per("splat", _splats, 33, "sums and code in; statistics both", 3),
     "splat_band": _per("splat", _splats, 16, "place in, length out; 100 cameras", 22 * _VIEWS),
     "splat_band_coverage": _per(
