@@ -17,7 +17,7 @@ PRESETS: Mapping[str, Mapping[str, Any]] = {
     "surface": {"surface.normal_consistency": 0.03},
     # The defaults of version 0.1.0, whose degrees of harmonics joined every 500 steps.
     "0.1": {
-        "octaves.count": 0,
+        "octaves": 0,
         "sh_every": 1 / 6,
         "angular.first": 0.15,
         "learning_rates.means": 1.6e-4,
