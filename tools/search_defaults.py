@@ -69,6 +69,8 @@ VARIANTS: dict[str, Settings] = {
     "no ramp": {"homogenise": 0.0},
     "linear light": {"light": "linear"},
     "surface": PRESETS["surface"],
+    "full size": {"octaves": 0},
+    "full size earlier": {"octaves.last": 0.2},
     "mcmc": _MCMC,
     "walk": {**_MCMC, "strategy.noise": 5e5},
     "walk / 10": {**_MCMC, "strategy.noise": 5e4},

@@ -39,7 +39,7 @@ class OctaveSettings:
     """Number of times that images are halved at first, each of which leaves out an octave of
     their frequencies until the residual is smaller than what that octave holds (0 = full size from
     the first step on). Default: as many as leave 8,000 pixels, of images above 250,000."""
-    last: Expert[float] = 0.4
+    last: Expert[float] = 0.6
     """Fraction of the run after which images have their full size at the latest; images that are
     halved twice end after half of that, and so on."""
 

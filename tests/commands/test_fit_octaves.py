@@ -25,7 +25,7 @@ def test_small_photographs_have_their_full_size_by_default(capture, tmp_path):
     out = tmp_path / "fit"
     assert main(["fit", str(capture), "--out", str(out), *FIT]) == 0
     config = json.loads((out / "config.json").read_text())["settings"]["training"]
-    assert config["octaves"] == {"count": 0, "last": 0.4}
+    assert config["octaves"] == {"count": 0, "last": 0.6}
     assert "octaves" not in json.loads((out / "metrics.json").read_text())
 
 

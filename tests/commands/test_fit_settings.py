@@ -32,6 +32,7 @@ OTHERS = {
     "angle_unit": "degrees",
     "rows": (1, 2),
     "order": 2,
+    "octaves": 1,
     "color_order": 3,
     "downscale": 2,
     "center": 3.5,
