@@ -136,3 +136,8 @@ def test_a_part_that_was_changed_since_is_told(own, scan, tmp_path, capsys):
     assert before["file of --load parzen.py"] == loaded_parts()["parzen.py"]
     assert main([*words, "--out", str(first), "--resume"]) == CheckpointError.exit_status
     assert "file of --load parzen.py" in capsys.readouterr().err
+
+
+def test_a_function_in_place_of_a_name_is_told_to_be_registered(tmp_path):
+    with pytest.raises(InputError, match=r"filter is .*wanted a text: register it .* its name"):
+        rift.reconstruct_scan(tmp_path / "scan.npz", filter=abs)

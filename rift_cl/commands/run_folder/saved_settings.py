@@ -431,7 +431,9 @@ def _value(hint: Any, value: Any, where: str) -> Any:
         return value
     wanted, takes = _PLAIN[hint]
     if not takes(value):
-        raise InputError(f"{where} is {value!r}, wanted {wanted}")
+        # Runs are repeated from what config.json holds, and that is names.
+        own = ": register it (rift.register_...) and give its name" if callable(value) else ""
+        raise InputError(f"{where} is {value!r}, wanted {wanted}{own}")
     return hint(value)
 
 
