@@ -4,7 +4,7 @@
     python tools/print_paper_page.py --results paper
 
 Nothing is computed here: what the page shows between its marks is what a figure's own file holds,
-with the device and the date of that file.
+with the device and the date of that file. Figures without a file there stay as they are.
 """
 
 from __future__ import annotations
@@ -65,10 +65,14 @@ def print_page(options: Options) -> str:
     """The page with its tables; its pictures are written."""
     text = options.page.read_text(encoding="utf-8")
     for name, number in re.findall(r"!\[[^\]]*\]\([^)]*paper-(\w+)-(\d)\.png\)", text):
+        if not (options.results / f"{name}.json").is_file():
+            continue
         picture = _small(_shown(options.results, name)[0].pictures[int(number)])
         (options.pictures / f"paper-{name}-{number}.png").write_bytes(picture)
 
     def table(found: re.Match[str]) -> str:
+        if not (options.results / f"{found[1]}.json").is_file():
+            return found[0]
         shown, about = _shown(options.results, found[1])
         columns, rows = shown.tables[0]
         lines = [_row(columns), _row([" --: "] * len(columns)), *map(_row, rows)]

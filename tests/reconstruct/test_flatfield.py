@@ -5,7 +5,11 @@ import pytest
 
 from rift_cl.errors import InputError, ShapeError
 from rift_cl.reconstruct import attenuation
-from rift_cl.reconstruct.preprocess.flatfield import attenuation_without_flats
+from rift_cl.reconstruct.preprocess.flatfield import (
+    Attenuation,
+    attenuation_without_flats,
+    without_stuck,
+)
 
 
 @pytest.fixture
@@ -138,3 +142,46 @@ def test_no_flat_frame_is_told(scan):
     _, counts, flats, darks = scan
     with pytest.raises(InputError, match="no flat frame"):
         attenuation(counts, flats[:0], darks)
+
+
+def _turning(views=180, bins=64, turn=np.pi):
+    """Line integrals of two discs, (angle, 2 rows, bin), and the angles."""
+    angles = np.arange(views) * turn / views
+    u = np.arange(bins) - (bins - 1) / 2
+    lines = 0.0
+    for place, radius in ((0.2, 0.3), (-0.25, 0.12)):
+        off = u - place * bins * np.cos(angles)[:, None]
+        lines = lines + 0.1 * np.sqrt(np.maximum((radius * bins) ** 2 - off**2, 0))
+    return np.repeat(lines[:, None].astype(np.float32), 2, axis=1), angles
+
+
+def _found(lines):
+    none = np.zeros(lines.shape[1], np.int64)
+    return Attenuation(lines.copy(), none, none)
+
+
+@pytest.mark.parametrize("value", [0.0, 1.5])
+@pytest.mark.parametrize("stuck", [[30], [20, 41], [30, 31, 32]])
+def test_pixels_that_read_the_same_in_all_views_are_filled(stuck, value):
+    truth, angles = _turning()
+    broken = truth.copy()
+    broken[:, 1, stuck] = value
+    found = without_stuck(_found(broken), angles)
+    assert found.dead_bins == tuple(stuck) and found.dead_of_rows.tolist() == [0, len(stuck)]
+    np.testing.assert_array_equal(found.projections[:, 0], truth[:, 0])
+    assert np.abs(found.projections - truth).max() < 0.25 * truth.max()
+    others = np.delete(np.arange(64), stuck)
+    np.testing.assert_array_equal(found.projections[..., others], truth[..., others])
+
+
+def test_bins_that_may_read_the_same_are_left_as_they_are():
+    truth, angles = _turning()
+    air = truth.copy()
+    air[..., :6] = air[..., -6:] = 0.3
+    disc = np.repeat(truth[:1], 180, axis=0)
+    few, wedge = truth[:6].copy(), truth[:60].copy()
+    few[..., 30] = wedge[..., 30] = 0
+    for lines, at in ((air, angles), (disc, angles), (few, angles[:6]), (wedge, angles[:60])):
+        found = without_stuck(_found(lines), at)
+        np.testing.assert_array_equal(found.projections, lines)
+        assert found.dead_bins == () and found.dead == 0

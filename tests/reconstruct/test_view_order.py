@@ -4,15 +4,16 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy.ndimage import gaussian_filter1d
 
 import rift_cl as rift
 from rift_cl.commands.cli import main
 from rift_cl.reconstruct.axis.circular import axis_of_fan
+from rift_cl.reconstruct.axis.moments import mass_doubt
 from rift_cl.reconstruct.axis.search import angle_doubt
-from rift_cl.reconstruct.axis.view_order import order_doubt
+from rift_cl.reconstruct.axis.view_order import jump_doubt, order_doubt
 
 BINS = 128
-RANDOM = np.random.default_rng(0)
 
 
 def sinogram(angles):
@@ -35,9 +36,11 @@ def by_name(count):
 def test_another_order_is_doubted_and_the_right_one_is_not(count, turn, noise):
     angles = even(count, turn)
     views = sinogram(angles)
-    views += (noise * views.std() * RANDOM.standard_normal(views.shape)).astype(np.float32)
+    views += (noise * views.std() * np.random.default_rng(1).standard_normal(views.shape)).astype(
+        np.float32
+    )
     assert order_doubt(views, angles) == ""
-    for order in (by_name(count), RANDOM.permutation(count)):
+    for order in (by_name(count), np.random.default_rng(1).permutation(count)):
         assert "another order" in order_doubt(views[order], angles)
         # It is the pairs that count, and not which of them stand first.
         assert order_doubt(views[order], angles[order]) == ""
@@ -50,7 +53,7 @@ def test_another_order_is_doubted_and_the_right_one_is_not(count, turn, noise):
         np.concatenate([even(120), even(120)]),  # twice the same
         even(400, 4 * np.pi),  # two turns
         np.mod(np.arange(200) * 2.399963, 2 * np.pi),  # by the golden angle
-        np.sort(RANDOM.uniform(0, np.pi, 200)),
+        np.sort(np.random.default_rng(1).uniform(0, np.pi, 200)),
         np.concatenate([even(100)[:60], even(100)[85:]]),  # a gap
     ],
 )
@@ -65,10 +68,15 @@ def test_a_few_views_that_went_wrong_are_no_other_order():
     assert order_doubt(views, angles) == ""
 
 
-def test_what_looks_alike_from_all_sides_tells_nothing():
-    angles, u = even(180), np.arange(BINS) - 63.5
-    disc = np.sqrt(np.maximum(40.0**2 - u**2, 0))
-    views = disc + RANDOM.standard_normal((180, BINS))
+@pytest.mark.parametrize("bins", [96, 128, 300])
+@pytest.mark.parametrize("blur", [0, 1, 2])
+@pytest.mark.parametrize("noise", [0.1, 1, 100])
+def test_noise_on_what_looks_alike_from_all_sides_tells_nothing(bins, blur, noise):
+    """Among many views of noise some match by chance; a detector's light spreads over bins."""
+    angles, u = even(180), np.arange(bins) - (bins - 1) / 2
+    disc = np.sqrt(np.maximum((0.3 * bins) ** 2 - u**2, 0))
+    white = np.random.default_rng(1).standard_normal((180, bins))
+    views = disc + noise * (gaussian_filter1d(white, blur, axis=1) if blur else white)
     assert order_doubt(views.astype(np.float32), angles) == ""
 
 
@@ -98,3 +106,80 @@ def test_the_command_says_so(tmp_path, capsys):
         given = ["reconstruct", str(tmp_path / "scan.npz"), "--out", str(tmp_path / "out")]
         main([*given, "--overwrite", *more])
         assert "angles are probably in another order" in capsys.readouterr().err
+
+
+def discs(angles, shift=0.0):
+    """Views of a disc with four others in it, moved along the detector."""
+    moved = np.arange(BINS) - (BINS - 1) / 2 - np.broadcast_to(shift, len(angles))[:, None]
+    total = 0.0
+    for x, y, radius in ((0, 0, 45), (20, 8, 9), (-16, 14, 6), (-4, -24, 7), (26, -16, 4)):
+        off = moved - x * np.cos(angles)[:, None] - y * np.sin(angles)[:, None]
+        total = total + np.sqrt(np.maximum(radius**2 - off**2, 0))
+    return np.asarray(total, np.float32)
+
+
+JUMPS = {
+    "lost": lambda: discs(np.delete(even(180), slice(80, 105))),
+    "moved": lambda: discs(even(180), np.where(np.arange(180) < 90, 0, 4.0)),
+    "interlaced": lambda: discs(even(180)[np.r_[0:180:2, 1:180:2]]),
+}
+
+
+@pytest.mark.parametrize("case", JUMPS)
+def test_one_pair_that_does_not_belong_together_is_named(case):
+    views = JUMPS[case]()
+    said = angle_doubt(views, even(len(views)))
+    first = 79 if case == "lost" else 89
+    assert f"views {first} and {first + 1}, whose angles are neighbours" in said
+
+
+@pytest.mark.parametrize(
+    "angles",
+    [even(180), even(400, 2 * np.pi), np.delete(even(180), slice(60, 100)), even(400, 4 * np.pi)],
+)
+@pytest.mark.parametrize("noise", [0, 0.05, 1])
+def test_scans_as_they_are_taken_have_no_such_pair(angles, noise):
+    views = sinogram(angles)
+    views += (noise * views.std() * np.random.default_rng(1).standard_normal(views.shape)).astype(
+        np.float32
+    )
+    assert jump_doubt(views, angles) == ""
+    views[30] = 0  # one bad view
+    assert jump_doubt(views, angles) == ""
+
+
+def test_the_largest_views_of_a_jump_are_numbered_as_in_the_file():
+    angles = even(180)
+    views = JUMPS["moved"]()[::-1]
+    assert "views 89 and 90" in jump_doubt(views, angles[::-1])
+
+
+@pytest.mark.parametrize(
+    ("shift", "doubted"),
+    [
+        (np.zeros(180), False),
+        (0.1 * np.sin(np.arange(180) / 7), False),
+        (np.where(np.arange(180) < 90, 0, 4.0), True),
+        (1.5 * np.sin(np.arange(180) / 11), True),
+    ],
+)
+def test_centres_of_mass_that_leave_their_sinusoid_are_doubted(shift, doubted):
+    angles = even(180)
+    assert bool(mass_doubt(discs(angles, shift), angles)) is doubted
+
+
+@pytest.mark.parametrize("noise", [0, 0.1, 0.3])
+def test_noise_moves_no_centre_of_mass_for_long(noise):
+    for count, turn in ((60, np.pi), (180, np.pi), (360, 2 * np.pi)):
+        angles = even(count, turn)
+        views = sinogram(angles)
+        views += (
+            noise * views.std() * np.random.default_rng(1).standard_normal(views.shape)
+        ).astype(np.float32)
+        assert mass_doubt(views, angles) == ""
+
+
+def test_views_of_nothing_are_refused_in_a_sentence():
+    views = np.concatenate([sinogram(even(180)), np.zeros((20, BINS), np.float32)])
+    with pytest.raises(rift.errors.InputError, match="the rotation axis cannot be found"):
+        rift.find_center(views, np.deg2rad(np.arange(200.0)))

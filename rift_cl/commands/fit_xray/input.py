@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 from rift_cl.cl.device import Device
 from rift_cl.commands.fit_photos.pictures import Light
 from rift_cl.commands.fit_xray.settings import FitXraySettings
+from rift_cl.commands.inputs.row_doubts import row_doubts
 from rift_cl.commands.inputs.scan_axis import find_axis
 from rift_cl.commands.inputs.scan_input import ScanInput
 from rift_cl.commands.inputs.scan_lengths import BIN, with_lengths
@@ -84,6 +85,8 @@ class XrayInput:
             )
         self.device = device
         self._refuse_for_cones(settings)
+        # What was found of the axis and has to be said of the rows, once they were read.
+        self.notes: list[str] = []
         self.rows = chosen_rows(settings.rows, self.scan)
         check_center(settings.center, self.scan)
         self.center = settings.center
@@ -148,15 +151,19 @@ class XrayInput:
                 f"{self.scan.path}: the line integrals are {scale:g} at most, wanted some above 0: "
                 "there is nothing to fit"
             )
-        values = integrals / np.float32(scale)
-        return Projections(self._geometry(), values, scale)
+        values, geometry = integrals / np.float32(scale), self._geometry()
+        middle = sum(self.rows) // 2
+        self.notes += row_doubts(self.scan, middle, read_attenuation(self.scan, middle, middle + 1))
+        return Projections(geometry, values, scale)
 
     def _geometry(self) -> Parallel | Cone | Vectors:
         """The rays, in lengths of bins as they are seen at the axis."""
         cone, center = self.scan.cone, self.center
         if cone is None:
             if center is None:
-                center = find_axis(self.scan, self.device).center
+                estimate = find_axis(self.scan, self.device)
+                center = estimate.center
+                self.notes.append(f"The rotation axis was found {estimate.in_words()}.")
             return Parallel(self.scan.angles, self.scan.shape[2], 1.0, float(center))
         if isinstance(cone, Cone) and center is not None:
             cone = dataclasses.replace(cone, center=(cone.center[0], center))

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from rift_cl.commands.fit.probe import TRIED, probed, time_words
 from rift_cl.commands.fit.run import FitRun
+from rift_cl.commands.fit_photos.report import history_notes
 from rift_cl.commands.fit_photos.scores import score_record
 from rift_cl.commands.fit_photos.view_split import split_views
 from rift_cl.commands.fit_xray.input import Projections, XrayInput, XrayPictures
@@ -100,6 +101,8 @@ class XrayFit(FitRun[FitXraySettings]):
         for note in self.input.scan.notes:
             self.announce(note)
         whole = self.input.read()
+        for note in self.input.notes:
+            self.announce(note)
         self.folder.make()
         measured = whole.of(self.training_views)
         pictures = XrayPictures(self.device, measured)
@@ -191,7 +194,9 @@ class XrayFit(FitRun[FitXraySettings]):
             writer.write(0, slices)
         self.folder.drop(*(set(VOLUME_NAMES.values()) - {path.name}))
         shown = (slices, density * volume)
-        page = xray_page(source.scan.path.name, shown, self.scores, self.losses, self.metrics)
+        notes = [*source.notes, *history_notes(self.metrics["history"])]
+        name = source.scan.path.name
+        page = xray_page(name, shown, self.scores, self.losses, self.metrics, notes)
         self.folder.finish(self.settled, self.metrics, page, self.device, asked=settings)
 
     def _voxels(self, splats: Splats, whole: Projections) -> Floats:

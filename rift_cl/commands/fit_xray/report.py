@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rift_cl.commands.fit_photos.report import history_notes
 from rift_cl.commands.fit_photos.scores import ViewScore
 from rift_cl.commands.fit_xray.scores import COLUMNS, SCORING, score_rows
 from rift_cl.commands.pictures.evenly_spaced import evenly
@@ -36,6 +35,7 @@ def xray_page(
     groups: Mapping[str, Sequence[ViewScore]],
     losses: Sequence[tuple[int, float]],
     metrics: Mapping[str, Any],
+    notes: Sequence[str] = (),
 ) -> Page:
     """The report of a finished fit.
 
@@ -45,6 +45,7 @@ def xray_page(
         groups: scores of held-out projections by the name of their group.
         losses: by step.
         metrics: the figures of the fit.
+        notes: sentences about it.
     """
     basis = f", {metrics['basis']}" if "basis" in metrics else ""
     page = Page(f"Splats fitted to {name}", f"{metrics['splats']} splats, X-rays{basis}")
@@ -60,7 +61,7 @@ def xray_page(
     figure = figure_svgs(lambda width: draw(width=width))
     page.figure(figure, caption="Of the projections as they came.", alt="Loss by step")
     shown = {k: v for k, v in metrics.items() if isinstance(v, (int, float, str))}
-    for note in history_notes(metrics["history"]):
+    for note in notes:
         page.paragraph(note)
     page.facts(shown)
     return page

@@ -17,6 +17,7 @@ from rift_cl.reconstruct.preprocess.flatfield import (
     Attenuation,
     attenuation,
     attenuation_without_flats,
+    without_stuck,
 )
 
 
@@ -64,6 +65,7 @@ def read_attenuation(scan: ScanFile, start: int, stop: int) -> Attenuation:
         integrals = _integrals(scan, rows, start)
     except InputError as error:
         raise type(error)(f"{scan.path}: {error}") from error
+    integrals = without_stuck(integrals, scan.angles)
     if scan.background:
         subtract_background(integrals.projections, scan.background)
     return integrals

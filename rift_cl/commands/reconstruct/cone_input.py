@@ -11,6 +11,7 @@ import numpy as np
 
 from rift_cl.cl.budget import format_bytes
 from rift_cl.cl.device import Device
+from rift_cl.commands.inputs.row_doubts import row_doubts
 from rift_cl.commands.inputs.scan_axis import doubted_circle, doubted_vectors, settled_axis
 from rift_cl.commands.inputs.scan_rows import check_center, scan_identity
 from rift_cl.commands.reconstruct.binned_file import binned_file, row_binning
@@ -197,6 +198,8 @@ class ConeInput:
     def locate(self) -> None:
         """Find the axis and the sense of rotation, unless they are said, and say what is done."""
         self.axis = self._found_axis()
+        middle = self.scan.shape[1] // 2
+        self.notes += row_doubts(self.scan, middle, self.clean.read(middle, middle + 1))
         self.geometry = self._geometry()
         self.window = VolumeWindow.of(self.settings, self.geometry)
         if self.tilt and isinstance(self.geometry, Cone):

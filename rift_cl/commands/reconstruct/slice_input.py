@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rift_cl.cl.device import Device
+from rift_cl.commands.inputs.row_doubts import row_doubts
 from rift_cl.commands.inputs.scan_axis import (
     SettledAxis,
     doubted_center,
@@ -171,8 +172,14 @@ class SliceInput:
         middle = sum(self.rows) // 2
         read = self.clean.read(middle, middle + 1)
         row = read.projections
+        doubts = row_doubts(self.scan, middle, read)
         if not self.settled:
-            self._find_axis()
+            try:
+                self._find_axis()
+            except InputError as error:
+                if not doubts:
+                    raise
+                raise type(error)(" ".join([f"{error}.", *doubts])) from error
         else:
             self.notes += self._doubts(row[:, 0])
         self.fan = self._fan()
@@ -194,7 +201,7 @@ class SliceInput:
         if wanted or self.settings.pad == "on":
             self.pad = max(1, self.scan.shape[2] // _PAD_SHARE)
             self.geometry = self.geometry if self.fan is None else self._geometry()
-        self.notes += _notes_of(self) + self._noise_note(row[:, 0])
+        self.notes += _notes_of(self) + doubts + self._noise_note(row[:, 0])
         if read.dead_bins and self.settings.binning == 1:
             self.notes.append(_dead_note(read.dead_bins, middle))
 
@@ -542,7 +549,7 @@ def _dead_note(bins: tuple[int, ...], row: int) -> str:
     listed = ", ".join(map(str, bins[:_MOST_LISTED])) + (", ..." if bins[_MOST_LISTED:] else "")
     words = f"bin {listed} does" if len(bins) == 1 else f"bins {listed} do"
     return (
-        f"In row {row} {words} not answer to the beam (dead pixels) and "
+        f"In row {row} {words} not answer to the beam (dead or stuck pixels) and "
         f"{'was' if len(bins) == 1 else 'were'} filled from the neighbours."
     )
 

@@ -26,7 +26,7 @@ from rift_cl.reconstruct.axis.lying_axis import looked_at, lying_axis
 from rift_cl.reconstruct.axis.opposite_views import enough_pairs, shared_views
 from rift_cl.reconstruct.axis.search import searched_axis, searched_rows
 from rift_cl.reconstruct.axis.sense import sense_of
-from rift_cl.reconstruct.axis.view_order import order_doubt
+from rift_cl.reconstruct.axis.view_order import jump_doubt, order_doubt
 from rift_cl.reconstruct.axis.views import Views
 
 Floats = NDArray[np.float64]
@@ -125,7 +125,8 @@ def axis_of_fan(
             f"span is {span}, wanted two bins in ascending order, between 0 and {fan.bins - 1}"
         )
     mean = rows.mean(axis=1, keepdims=True)
-    doubted = doubted or order_doubt(mean[:, 0], fan.angles)
+    middle_row = mean[:, 0], fan.angles
+    doubted = doubted or order_doubt(*middle_row) or jump_doubt(*middle_row)
     ways = fan, fan.at(-fan.angles)
     try:
         found, told = _either_way(rows, mean, places, middle, ways, span)

@@ -117,6 +117,8 @@ class OppositeViews:
             row = replace(row, seen=row.place(self._seen))
         centers, scores = mirror_scores(row, self._pairs, row.place(low), row.place(high))
         starts = _peaks(row.detector(centers), scores, _APART * bins)
+        if not len(starts):
+            return None
         best = _best([self._settled(row, start) for start in starts], bins)
         return best._replace(
             drift=0.0 if best.evidence is None else best.evidence.drift(best.center)
@@ -149,6 +151,8 @@ class DoubleWedge:
         coarse = self._row(views, _binning(bins, _COARSE), cut)
         centers, scores = _everywhere(coarse, low, high)
         starts = _peaks(centers, scores, _APART * bins)
+        if not len(starts):
+            return None
         best = _best([self._settled(coarse, start) for start in starts], bins)
         if cut or _binning(bins, _FINE) != coarse.bin:
             fine = self._fine(self._row(views, _binning(bins, _FINE), cut), best.center)

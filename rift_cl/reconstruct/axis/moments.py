@@ -29,8 +29,11 @@ _OBJECT, _SURE, _MARGIN = 0.02, 3.5, 6
 _ACROSS, _AROUND = 5, 1 / 40
 # Least number of bins on either side of the object that tell the level of air.
 _AIR = 4
-# Groups of neighbouring views whose disagreement tells the error.
-_GROUPS = 12
+# Groups of neighbouring views whose disagreement tells the error, and whose mean centres must lie
+# on the sinusoid.
+_GROUPS, _PARTS = 12, 24
+# By how much these may leave it: bins, a share of the detector, and so many standard errors.
+_OFF, _OFF_SHARE, _OFF_SURE = 0.4, 5e-4, 4.0
 
 
 class MassCenter(NamedTuple):
@@ -59,6 +62,74 @@ def mass_center(views: NDArray[np.float32], angles: Floats) -> MassCenter | None
     Returns:
         Its bin and how sure that is; None where mass is not the same in all views.
     """
+    path = _path(views, angles)
+    if path is None:
+        return None
+    views, noise, seen, mass, centers, inverse, left = path
+    places, center = np.arange(views.shape[1]), float(inverse[0] @ centers)
+    # Sums over groups of neighbours, so that residuals that go together count together.
+    groups = np.array_split(inverse[0] * left, min(_GROUPS, len(left)))
+    free = len(left) / max(len(left) - 3, 1)
+    error = max(
+        np.sqrt(sum(group.sum() ** 2 for group in groups)),
+        float(np.linalg.norm(inverse[0])) * float(left.std()) * np.sqrt(free),
+    )
+    # What a level that each bin adds to all views would do to the centre.
+    pull = inverse[0] @ (seen * (places - centers[:, None]) / mass[:, None])
+    return MassCenter(center, float(np.hypot(error, _air_error(views, seen, pull, noise))))
+
+
+def mass_doubt(views: NDArray[np.float32], angles: Floats) -> str:
+    """What the centres of mass of a row of parallel rays have against its angles.
+
+    Args:
+        views: line integrals of one row, (angle, bin), whole in every view.
+        angles: in radians.
+
+    Returns:
+        The end of a sentence; empty where they lie on a sinusoid, or mass is not the same in all
+        views.
+    """
+    path = _path(views, angles)
+    if path is None or len(views) < 2 * _PARTS:
+        return ""
+    spread = path.noise * path.seen.sum(axis=1).mean() ** 1.5 / np.sqrt(12) / path.mass.mean()
+    parts = np.array([part.mean() for part in np.array_split(path.left, _PARTS)])
+    off = float(np.sqrt(np.mean(parts**2)))
+    sure = _OFF_SURE * spread * np.sqrt(_PARTS / len(views))
+    if not off > max(_OFF, _OFF_SHARE * views.shape[1], sure):
+        return ""
+    return (
+        "the centres of mass of the views leave the sinusoid that those of a turning object follow "
+        f"by {off:.2g} bins (root mean square): the angles are not those of the views, or the "
+        "object moved during the scan"
+    )
+
+
+class _Path(NamedTuple):
+    """The centres of mass of views, sorted by their angles.
+
+    Args:
+        views: the line integrals.
+        noise: standard deviation of their noise.
+        seen: the bins of each view that the object reaches.
+        mass: of each view.
+        centers: of mass, in bins.
+        inverse: the pseudo-inverse of the sinusoid's model.
+        left: what the best sinusoid leaves of the centres.
+    """
+
+    views: NDArray[np.float32]
+    noise: float
+    seen: NDArray[np.bool_]
+    mass: Floats
+    centers: Floats
+    inverse: Floats
+    left: Floats
+
+
+def _path(views: NDArray[np.float32], angles: Floats) -> _Path | None:
+    """None where mass is not the same in all views."""
     order = np.argsort(angles, kind="stable")
     views, angles = views[order], angles[order]
     noise = _noise(views)
@@ -74,18 +145,8 @@ def mass_center(views: NDArray[np.float32], angles: Floats) -> MassCenter | None
     centers = (part @ places) / mass
     model = np.stack([np.ones_like(angles), np.cos(angles), np.sin(angles)], axis=1)
     inverse = np.linalg.pinv(model)
-    center = float(inverse[0] @ centers)
     left = centers - model @ (inverse @ centers)
-    # Sums over groups of neighbours, so that residuals that go together count together.
-    groups = np.array_split(inverse[0] * left, min(_GROUPS, len(left)))
-    free = len(left) / max(len(left) - 3, 1)
-    error = max(
-        np.sqrt(sum(group.sum() ** 2 for group in groups)),
-        float(np.linalg.norm(inverse[0])) * float(left.std()) * np.sqrt(free),
-    )
-    # What a level that each bin adds to all views would do to the centre.
-    pull = inverse[0] @ (seen * (places - centers[:, None]) / mass[:, None])
-    return MassCenter(center, float(np.hypot(error, _air_error(views, seen, pull, noise))))
+    return _Path(views, noise, seen, mass, centers, inverse, left)
 
 
 def _air_error(

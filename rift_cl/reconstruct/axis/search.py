@@ -16,10 +16,11 @@ from numpy.typing import NDArray
 from rift_cl.errors import InputError
 from rift_cl.reconstruct.axis.estimate import AxisEstimate
 from rift_cl.reconstruct.axis.measures import RowAxis, chosen_measure
+from rift_cl.reconstruct.axis.moments import mass_doubt
 from rift_cl.reconstruct.axis.repeated import repeated_angles
 from rift_cl.reconstruct.axis.turn import other_turn
-from rift_cl.reconstruct.axis.view_order import order_doubt
-from rift_cl.reconstruct.axis.views import Views, without_rings
+from rift_cl.reconstruct.axis.view_order import jump_doubt, order_doubt
+from rift_cl.reconstruct.axis.views import Views, is_cut, without_rings
 
 Floats = NDArray[np.float64]
 
@@ -103,7 +104,9 @@ def angle_doubt(views: Views, angles: Floats) -> str:
         The end of a sentence.
     """
     found = repeated_angles(views, angles) or other_turn(views, angles)
-    return order_doubt(views, angles) or ("" if found is None else found.in_words())
+    told = order_doubt(views, angles) or ("" if found is None else found.in_words())
+    told = told or jump_doubt(views, angles)
+    return told or ("" if is_cut(views) else mass_doubt(views, angles))
 
 
 def _scatter_doubt(found: AxisEstimate) -> str:

@@ -6,7 +6,7 @@ and of the flat frames (beam, no sample), in which outliers among five frames or
 flats that were taken at several times are interpolated between them, because beams drift. Two kinds
 of samples tell nothing:
 
-- a *dead* detector pixel does not answer to the beam;
+- a *dead* detector pixel does not answer to the beam, or reads the same whatever turns before it;
 - a *starved* sample has no more signal than the darks' noise. Its logarithm would be that of a
   number nobody measured: a floor of some fraction of a quantum gives spikes of 10 to 16, in the
   middle of line integrals of 4 or 5, which become streaks across the slice.
@@ -18,7 +18,7 @@ an invented peak. One such column would otherwise be a ring, and one NaN a ruine
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,6 +34,9 @@ _FAINTEST = 1e-7
 # Flats or darks from which on an outlier among them can be told: so many standard deviations, of
 # which the median deviation is one over 1.48.
 _ENOUGH_FRAMES, _OUTLIER, _SIGMAS = 5, 8.0, 1.48
+# Views and angle from which on a pixel that reads the same in all of them is told, and by how much
+# it may vary, as a share of what its row spans.
+_ENOUGH_VIEWS, _ENOUGH_TURN, _STUCK = 12, np.radians(150), 1e-6
 # Dark frames from which on their noise can be told.
 _ENOUGH_DARKS = 3
 
@@ -142,6 +145,42 @@ def attenuation_without_flats(
     scale = 1.0 if incident is None else float(np.mean(incident))
     faintest = np.maximum(_dark_noise(darks) / np.float32(scale), _FAINTEST * beam)
     return _minus_log(signal, faintest, np.zeros(projections.shape[1:], np.bool_), first_row)
+
+
+def without_stuck(found: Attenuation, angles: NDArray[np.float64]) -> Attenuation:
+    """Fill pixels that read the same in all views, as dead and saturated ones do.
+
+    Whatever turns passes all bins up to its distance from the axis within half a turn, so that a
+    bin between others that vary must vary too. Such pixels make rings, and a search that matches
+    views finds the axis in their middle.
+
+    Args:
+        found: line integrals; changed in place.
+        angles: of the views, in radians; less than half a turn tells nothing.
+    """
+    lines = found.projections
+    if len(lines) < _ENOUGH_VIEWS or np.ptp(angles) < _ENOUGH_TURN:
+        return found
+    # Most pixels are seen to vary by a few views alone.
+    few = lines[np.linspace(0, len(lines) - 1, _ENOUGH_VIEWS).astype(int)]
+    room = _STUCK * np.ptp(few, axis=(0, 2))[:, None]
+    stuck = np.ptp(few, axis=0) <= room
+    dead, bins = found.dead_of_rows.copy(), set(found.dead_bins)
+    for row in np.flatnonzero(stuck.any(axis=1)):
+        varying = np.flatnonzero(~stuck[row])
+        if not len(varying):
+            continue
+        between = np.flatnonzero(stuck[row, : varying[-1]])
+        between = between[between > varying[0]]
+        between = between[np.ptp(lines[:, row, between], axis=0) <= room[row]]
+        if not 0 < len(between) <= len(varying) / 2:
+            continue
+        unknown = np.zeros(lines.shape[::2], np.bool_)
+        unknown[:, between] = True
+        _fill(lines[:, row], unknown, int(row))
+        dead[row] += len(between)
+        bins.update(map(int, between))
+    return replace(found, dead_of_rows=dead, dead_bins=tuple(sorted(bins)))
 
 
 def _mean_dark(projections: Floats, darks: Floats | None) -> Floats:

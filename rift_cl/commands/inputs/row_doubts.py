@@ -1,0 +1,128 @@
+"""What a row of counts has against its own flats, darks and beam.
+
+Line integrals are as good as the frames that they are divided by. Where these are not those of the
+beam of the scan, slices come out all the same, with other values.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rift_cl.io.scans.scan_file import ScanFile, ScanRows
+from rift_cl.reconstruct.preprocess.flatfield import Attenuation
+
+Floats = NDArray[np.float32]
+# Share of the usual brightness below which a view has no beam.
+_NO_BEAM = 0.05
+# Share of samples without a signal that is worth a sentence.
+_STARVED = 0.01
+# Transmission that nothing explains, in the mean of neighbouring samples, and the share of them.
+_BRIGHT, _NEIGHBOURS, _BRIGHT_SHARE = 1.15, (5, 5), 0.02
+# Factor by which flats of one time may differ.
+_UNLIKE = 1.5
+# Share of a detector's flat pixels at the largest code that tells of saturation.
+_FULL_SHARE = 0.02
+# Level of both ends of the detector that is worth a doubt, as a share of the largest line integral,
+# and by how much of it ends may differ from each other, from view to view and along their bins.
+_OFF, _ALIKE, _END = 0.03, 0.1, 1 / 20
+# Codes up to which detectors count.
+_FULL = tuple(float(2**bits - 1) for bits in (8, 10, 12, 14, 16))
+
+
+def row_doubts(scan: ScanFile, row: int, found: Attenuation) -> list[str]:
+    """Sentences about a row, none where nothing is wrong with it.
+
+    Args:
+        scan: the scan.
+        row: which.
+        found: its line integrals, as they are worked on.
+    """
+    lines = found.projections[:, 0]
+    notes = _dark_views(lines) + _starved(found, row)
+    if scan.kind == "attenuation":
+        return notes
+    frames = scan.read(row, row + 1)
+    told = _frames(frames) or _bright(lines, row) or _weak_beam(scan, lines)
+    return notes + told
+
+
+def _dark_views(lines: Floats) -> list[str]:
+    """Views in which no bin sees what it usually does."""
+    light = np.percentile(np.exp(-np.minimum(lines, 50)), 95, axis=1)
+    dark = np.flatnonzero(light < _NO_BEAM * np.median(light))
+    if not 0 < len(dark) < len(lines) / 2:
+        return []
+    where = f"view {dark[0]}" if len(dark) == 1 else f"views {dark[0]} to {dark[-1]}"
+    return [
+        f"Doubt: {len(dark)} of {len(lines)} views have next to no beam ({where}): the shutter was "
+        "shut, or they are darks; leave them out, with their angles."
+    ]
+
+
+def _starved(found: Attenuation, row: int) -> list[str]:
+    views, _, bins = found.projections.shape
+    share = found.starved / (views * bins)
+    if share <= _STARVED:
+        return []
+    return [
+        f"Doubt: {100 * share:.0f} % of the samples of row {row} have no signal above the darks' "
+        "noise and were filled from their neighbours: the densities there are too low."
+    ]
+
+
+def _frames(rows: ScanRows) -> list[str]:
+    """What flats have against each other, and against the detector's range."""
+    flats = rows.flats
+    if flats is None or len(flats) < 2:
+        return []
+    most = float(flats.max())
+    full = (flats == most).all(axis=0)
+    if most in _FULL and full.mean() > _FULL_SHARE:
+        return [
+            f"Doubt: {100 * full.mean():.0f} % of the detector's pixels read {most:.0f} in all "
+            "flats, the largest code that they can: they are saturated, so that line integrals "
+            "come out too small."
+        ]
+    dark = 0.0 if rows.darks is None else float(np.median(rows.darks))
+    levels = np.median(flats, axis=(1, 2)) - dark
+    if levels.min() > 0 and levels.max() <= _UNLIKE * levels.min():
+        return []
+    return [
+        f"Doubt: the flats read {levels.min():.4g} to {levels.max():.4g} above the darks: some of "
+        "them are not the open beam."
+    ]
+
+
+def _bright(lines: Floats, row: int) -> list[str]:
+    """Samples that are brighter than the open beam."""
+    from scipy.ndimage import uniform_filter
+
+    mean = uniform_filter(lines, _NEIGHBOURS, mode="nearest")
+    share = float((mean < -np.log(_BRIGHT)).mean())
+    if share <= _BRIGHT_SHARE:
+        return []
+    return [
+        f"Doubt: {100 * share:.0f} % of row {row} is brighter than the open beam, up to "
+        f"{np.exp(-float(mean.min())):.3g} times: the flats were taken with a weaker beam or with "
+        "the object in it, or the values are inverted."
+    ]
+
+
+def _weak_beam(scan: ScanFile, lines: Floats) -> list[str]:
+    """Both ends of the detector off zero by as much in all views and all their bins, as air is."""
+    if scan.background:
+        return []
+    count = max(2, round(_END * lines.shape[1]))
+    ends = lines[:, :count], lines[:, -count:]
+    levels = [float(end.mean()) for end in ends]
+    level = sum(levels) / 2
+    if level <= _OFF * float(lines.max()) or abs(levels[0] - levels[1]) > _ALIKE * level:
+        return []
+    spreads = [end.mean(axis=axis).std() for end in ends for axis in (0, 1)]
+    if max(spreads) > _ALIKE * level:
+        return []
+    return [
+        f"Doubt: both ends of the detector read {level:.3g} in all views alike, as air does where "
+        f"the beam was weaker than in the flats: --background {count} brings it to zero."
+    ]

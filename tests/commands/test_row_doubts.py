@@ -1,0 +1,117 @@
+"""Counts whose flats, darks or beam are not those of the scan: slices come out, and a doubt."""
+
+from __future__ import annotations
+
+import re
+
+import h5py
+import numpy as np
+import pytest
+
+import rift_cl as rift
+from rift_cl.commands.cli import main
+
+VIEWS, BINS, BEAM, DARK = 120, 96, 20000, 100
+ANGLES = np.arange(VIEWS) * np.pi / VIEWS
+
+
+@pytest.fixture(scope="module")
+def lines():
+    """Line integrals (view, 2 rows, bin), 2 at most, air at both ends."""
+    scan = rift.Parallel(ANGLES, BINS)
+    found = np.asarray(rift.phantom.shepp_logan_sinogram(rift.Grid((64, 64)), scan))
+    return np.repeat(2 * (found / found.max())[:, None], 2, axis=1)
+
+
+def frames(lines, beam=BEAM):
+    random = np.random.default_rng(0)
+    return {
+        "data": random.poisson(beam * np.exp(-lines)) + DARK,
+        "data_white": random.poisson(BEAM, (8, 2, BINS)) + DARK,
+        "data_dark": random.poisson(DARK, (8, 2, BINS)),
+    }
+
+
+def said(tmp_path, capsys, made, *more):
+    """What is printed of a scan; its slices are made."""
+    with h5py.File(tmp_path / "scan.h5", "w") as file:
+        for name, values in made.items():
+            file[f"exchange/{name}"] = np.clip(values, 0, 65535).astype(np.uint16)
+        file["exchange/theta"] = np.rad2deg(ANGLES)
+    words = ["reconstruct", str(tmp_path / "scan.h5"), "--out", str(tmp_path / "out"), *more]
+    assert main([*words, "--center", str((BINS - 1) / 2)]) == 0
+    return capsys.readouterr().err
+
+
+def _dark_views(lines):
+    made = frames(lines)
+    made["data"][70:90] = np.random.default_rng(1).poisson(DARK, (20, 2, BINS))
+    return made
+
+
+def _dark_flats(lines):
+    made = frames(lines)
+    made["data_white"][:3] = made["data_dark"][:3]
+    return made
+
+
+def _sample_in_flats(lines):
+    made = frames(lines)
+    return {**made, "data_white": made["data"][:8]}
+
+
+def _saturated(lines):
+    made = frames(lines)
+    return {**made, "data": 4 * made["data"], "data_white": 4 * made["data_white"]}
+
+
+WRONG = {
+    "no beam": (_dark_views, "20 of 120 views have next to no beam .views 70 to 89"),
+    "starved": (lambda lines: frames(6 * lines, BEAM), "of row 1 have no signal above"),
+    "dark flats": (_dark_flats, "the flats read .* above the darks: some of them"),
+    "sample in flats": (_sample_in_flats, "of row 1 is brighter than the open beam"),
+    "stronger beam": (lambda lines: frames(lines, 1.6 * BEAM), "brighter than the open beam"),
+    "weaker beam": (lambda lines: frames(lines, 0.7 * BEAM), "ends of the detector read 0.35"),
+    "saturated": (_saturated, "100 % of the detector's pixels read 65535"),
+}
+
+
+@pytest.mark.parametrize("case", WRONG)
+def test_what_is_wrong_with_counts_is_said(lines, tmp_path, capsys, case):
+    make, words = WRONG[case]
+    assert re.search(f"Doubt: .*{words}", said(tmp_path, capsys, make(lines)))
+
+
+@pytest.mark.parametrize("scale", [0.2, 1, 2.5])
+def test_nothing_is_said_of_counts_that_are_right(lines, tmp_path, capsys, scale):
+    assert "Doubt" not in said(tmp_path, capsys, frames(scale * lines))
+
+
+def test_the_remedy_that_is_named_ends_the_doubt(lines, tmp_path, capsys):
+    weaker = frames(lines, 0.7 * BEAM)
+    assert "--background 5 brings it to zero" in said(tmp_path, capsys, weaker)
+    assert "Doubt" not in said(tmp_path, capsys, weaker, "--background", "5", "--overwrite")
+
+
+def test_an_axis_that_is_not_found_for_that_is_told_with_it(lines, tmp_path, capsys):
+    made = _sample_in_flats(lines)
+    with h5py.File(tmp_path / "scan.h5", "w") as file:
+        for name, values in made.items():
+            file[f"exchange/{name}"] = values.astype(np.uint16)
+        file["exchange/theta"] = np.rad2deg(ANGLES)
+    main(["reconstruct", str(tmp_path / "scan.h5"), "--out", str(tmp_path / "out")])
+    assert "brighter than the open beam" in capsys.readouterr().err
+
+
+def test_a_fit_of_xrays_says_what_was_found(lines, tmp_path, capsys):
+    made = frames(lines, 1.6 * BEAM)
+    with h5py.File(tmp_path / "scan.h5", "w") as file:
+        for name, values in made.items():
+            file[f"exchange/{name}"] = values.astype(np.uint16)
+        file["exchange/theta"] = np.rad2deg(ANGLES)
+    fit = ["fit", "xray", str(tmp_path / "scan.h5"), "--out", str(tmp_path / "fit")]
+    assert main([*fit, "--steps", "3", "--splats", "20", "--rows", "0", "1"]) == 0
+    told = capsys.readouterr().err
+    assert "The rotation axis was found at bin" in told and "brighter than the open beam" in told
+    page = (tmp_path / "fit" / "report.html").read_text()
+    assert "The rotation axis was found at bin" in page
