@@ -146,6 +146,17 @@ def show(page: Page, result: dict[str, Any]) -> None:
         }
         words = f"Relative error at the end of unseen photographs: {group}."
         draw_curves(page, series, "error / truth, dB", words)
+    moments_table(page, runs)
+    page.paragraph(
+        "Not claimed: which kind of model is better. The fields are small, in plain torch, without "
+        "the occupancy grids and fused kernels that make such fields fast; one seed, one scene. "
+        "Occlusion breaks the slice theorem, so that coverage tells what views could sample, not "
+        "what they saw. Photographs' own noise is part of the errors at the highest frequencies."
+    )
+
+
+def moments_table(page: Page, runs: Sequence[dict[str, Any]]) -> None:
+    """The scores of models on the way."""
     rows = [
         (run["model"], m["step"], m["cpu_s"], m["ring"]["psnr"], m["off the ring"]["psnr"])
         for run in runs
@@ -153,12 +164,6 @@ def show(page: Page, result: dict[str, Any]) -> None:
     ]
     columns = ("model", "step", "processor s", "PSNR, ring", "PSNR, off the ring")
     page.table(columns, rows, caption="Mean PSNR in dB of unseen photographs on the way.")
-    page.paragraph(
-        "Not claimed: which kind of model is better. The fields are small, in plain torch, without "
-        "the occupancy grids and fused kernels that make such fields fast; one seed, one scene. "
-        "Occlusion breaks the slice theorem, so that coverage tells what views could sample, not "
-        "what they saw. Photographs' own noise is part of the errors at the highest frequencies."
-    )
 
 
 def draw_curves(

@@ -17,7 +17,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from paper.coordinate_network import torch_is_missing
-from paper.field_bias import draw_curves, field_fit
+from paper.field_bias import draw_curves, field_fit, moments_table
 from paper.fits import fit_settings
 from paper.moments import start
 from paper.plan import Plan
@@ -156,13 +156,7 @@ def show(page: Page, result: dict[str, Any]) -> None:
             for run in result["runs"]
         }
         draw_curves(page, series, "error / truth, dB", words)
-    rows = [
-        (run["model"], m["step"], m["cpu_s"], m["ring"]["psnr"], m["off the ring"]["psnr"])
-        for run in result["runs"]
-        for m in run["moments"]
-    ]
-    columns = ("model", "step", "processor s", "PSNR, ring", "PSNR, off the ring")
-    page.table(columns, rows, caption="Mean PSNR in dB of unseen photographs on the way.")
+    moments_table(page, result["runs"])
     page.paragraph(
         "Not claimed: that no network would help. This one is small and in plain torch; one seed, "
         "one scene."

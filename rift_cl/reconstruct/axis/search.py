@@ -178,7 +178,8 @@ def _doubt(told: RowAxis | None, span: tuple[float, float] | None, views: Views)
     low, high = span or (0, bins - 1)
     if not low <= told.center <= high:
         return f"nothing between the bins {low:g} and {high:g} stands out"
-    if told.score < _SCORE or told.coherence < _COHERENCE or told.rival > _RIVAL * told.score:
+    weak = told.score < _SCORE or told.coherence < _COHERENCE or told.error == np.inf
+    if weak or told.rival > _RIVAL * told.score:
         return "no place on the detector stands out from the others"
     if not _HALF_INTERVAL * told.error <= _WIDEST_ROW:
         return _too_wide(_HALF_INTERVAL * told.error)
