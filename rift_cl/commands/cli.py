@@ -295,6 +295,15 @@ def _center(settings: Any, output: Output) -> None:
         return
     if "doubt" in job.metrics:
         _print_notes([job.metrics["doubt"]])
+    if "tilt_degrees" in job.metrics:
+        tilt = job.metrics["tilt_degrees"]
+        _print_notes(
+            [
+                f"the axis leans by {tilt:.3g} degrees, which moves it in other rows: 'rift "
+                f"reconstruct' turns projections by that where it finds the axis itself; beside "
+                f"--center it wants --tilt {tilt:.3g}"
+            ]
+        )
     low, high = job.metrics["interval"]
     # Apart from the bin, which a script reads from standard output.
     print(f"95 % interval: {low:.2f} to {high:.2f}", file=sys.stderr)

@@ -31,6 +31,8 @@ from rift_cl.option_marks import EXPERT, Auto, Group
 if TYPE_CHECKING:
     from rift_cl.cl.device import Device
 
+# A larger tilt of an axis is no misalignment, in degrees.
+MOST_TILT = 5.0
 # What something has to be given for has no default.
 MISSING = (dataclasses.MISSING, tyro.MISSING)
 # The name of the choice where a part of the settings is one of several kinds.

@@ -163,6 +163,16 @@ def test_a_tilted_axis_is_made_upright(tmp_path):
     assert "turned by 4.000 degrees" in notes(tmp_path / "right")
 
 
+def test_the_center_command_names_the_tilt_that_its_bin_leaves_out(tmp_path, capsys):
+    for degrees in (4.0, 0.0):
+        path = tilted_counts(tmp_path / f"{degrees:g}.h5", degrees)
+        assert main(["center", str(path), "--out", str(tmp_path / f"found_{degrees:g}")]) == 0
+        said = capsys.readouterr().err
+        assert ("leans by" in said) == bool(degrees)
+        if degrees:
+            assert float(said.split("leans by ")[1].split()[0]) == pytest.approx(4, abs=0.3)
+
+
 @pytest.fixture(scope="module")
 def half_acquisition(tmp_path_factory):
     """A full turn with the axis near the detector's end, and the true slice."""

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rift_cl.commands.center.settings import CenterSettings
-from rift_cl.commands.inputs.scan_axis import find_axis
+from rift_cl.commands.inputs.scan_axis import find_axis, tilt_worth_turning
 from rift_cl.commands.inputs.scan_rows import read_attenuation
 from rift_cl.commands.options import absolute_paths
 from rift_cl.commands.run_folder.run_folder import RunFolder
@@ -77,7 +77,9 @@ class CenterJob:
         total = 1 + len(_SLIDER)
         yield Report(0, total, "steps")
         found = find_axis(self.scan, self.device, span=self.settings.span)
-        self.metrics = {**found.record(), "row": self.row}
+        tilt = tilt_worth_turning(found, self.scan.shape[1])
+        told = {"tilt_degrees": tilt} if tilt else {}
+        self.metrics = {**found.record(), **told, "row": self.row}
         here = found.center + found.tilt * (self.row - self._middle)
         turned = found.sense is not None and found.sense.sign < 0
         sinogram = read_attenuation(self.scan, self.row, self.row + 1).projections[:, 0]

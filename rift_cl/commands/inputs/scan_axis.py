@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Any
 
@@ -10,6 +11,7 @@ from numpy.typing import NDArray
 
 from rift_cl.cl.device import Device
 from rift_cl.commands.inputs.scan_rows import read_attenuation
+from rift_cl.commands.options import MOST_TILT
 from rift_cl.errors import InputError, RiftError
 from rift_cl.geometry import Cone, Fan, Vectors
 from rift_cl.geometry.nearly_upright import nearly_upright
@@ -20,6 +22,9 @@ from rift_cl.reconstruct.axis.fan_doubt import sense_doubt
 from rift_cl.reconstruct.axis.lying_axis import looked_at, lying_axis
 from rift_cl.reconstruct.axis.search import GIVE_IT
 
+# A tilt is turned where it moves the axis by so many bins between the middle row and the first; one
+# that is not sure is told from so many times its standard error.
+_TILT_MATTERS, _TOLD = 0.25, 2.0
 # By how many bins an interval may miss an axis that was given before that is worth a doubt.
 _NEAR = 0.5
 # Transmission below this share of the median tells nothing more.
@@ -170,6 +175,30 @@ def doubted_vectors(scan: ScanFile, vectors: Vectors) -> tuple[str, ...]:
         f"{doubt}: the images are mirrored, or the vectors are. They were taken as they are; turn "
         "the images, or mend the vectors (--geometry).",
     )
+
+
+def tilt_worth_turning(estimate: AxisEstimate, rows: int) -> float:
+    """The tilt that was found, in degrees, where it is sure and moves the axis; else 0."""
+    turns = estimate.tilt_is_sure and _moves(estimate, rows)
+    return math.degrees(math.atan(estimate.tilt)) if turns else 0.0
+
+
+def unsure_tilt(estimate: AxisEstimate, rows: int) -> list[str]:
+    """What is told of a tilt that would matter, and is not sure enough to turn projections."""
+    told = abs(estimate.tilt) > _TOLD * estimate.tilt_error and _moves(estimate, rows)
+    if estimate.tilt_is_sure or not told:
+        return []
+    tilt, error = (math.degrees(math.atan(slope)) for slope in (estimate.tilt, estimate.tilt_error))
+    does_so = f" (--tilt {tilt:.2g} does so)" if abs(tilt) <= MOST_TILT else ""
+    return [
+        f"The rows' axes lie about a line that tilts by {tilt:.2g} +- {error:.2g} degrees, from "
+        f"which they scatter {estimate.scatter:.2g} times as much as their errors explain: "
+        f"projections were not turned by it{does_so}."
+    ]
+
+
+def _moves(estimate: AxisEstimate, rows: int) -> bool:
+    return abs(estimate.tilt) * (rows - 1) / 2 >= _TILT_MATTERS
 
 
 def _of_cone(

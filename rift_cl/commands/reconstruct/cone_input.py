@@ -12,12 +12,17 @@ import numpy as np
 from rift_cl.cl.budget import format_bytes
 from rift_cl.cl.device import Device
 from rift_cl.commands.inputs.row_doubts import row_doubts
-from rift_cl.commands.inputs.scan_axis import doubted_circle, doubted_vectors, settled_axis
+from rift_cl.commands.inputs.scan_axis import (
+    doubted_circle,
+    doubted_vectors,
+    settled_axis,
+    tilt_worth_turning,
+    unsure_tilt,
+)
 from rift_cl.commands.inputs.scan_rows import check_center, scan_identity
 from rift_cl.commands.reconstruct.binned_file import binned_file, row_binning
 from rift_cl.commands.reconstruct.clean_rows import Alignment, CleanRows
 from rift_cl.commands.reconstruct.settings import ReconstructSettings
-from rift_cl.commands.reconstruct.slice_input import tilt_worth_turning, unsure_tilt
 from rift_cl.commands.reconstruct.slice_window import check_window
 from rift_cl.errors import InputError, ResourceLimitError
 from rift_cl.geometry import Cone, Grid, Vectors

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
 from rift_cl.commands.inputs.scan_input import ScanInput
-from rift_cl.commands.options import SpreadRun
+from rift_cl.commands.options import MOST_TILT, SpreadRun
 from rift_cl.errors import InputError
 from rift_cl.option_marks import Auto, AutoExpert, Expert
 from rift_cl.own_parts import decisive_parts
@@ -39,8 +39,6 @@ _ONLY = {
 _STEPS = {"sirt": 100, "cgls": 30, "tv": 200, "levels": 1200}
 # Preconditioned CGLS is near its best after the first few iterations.
 _PRECONDITIONED_CGLS = 4
-# A larger tilt is no misalignment, in degrees.
-MOST_TILT = 5.0
 # Least passes over all subsets.
 _FEWEST_PASSES = 5
 # What may differ between a run and the one that resumes it: it changes no bit of the result.

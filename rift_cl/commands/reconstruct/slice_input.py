@@ -23,6 +23,8 @@ from rift_cl.commands.inputs.scan_axis import (
     doubted_circle,
     find_axis,
     settled_axis,
+    tilt_worth_turning,
+    unsure_tilt,
 )
 from rift_cl.commands.inputs.scan_lengths import BIN
 from rift_cl.commands.inputs.scan_rows import (
@@ -32,7 +34,7 @@ from rift_cl.commands.inputs.scan_rows import (
 )
 from rift_cl.commands.reconstruct.binned_file import binned_file, row_binning
 from rift_cl.commands.reconstruct.clean_rows import Alignment, CleanRows, LoadedRows
-from rift_cl.commands.reconstruct.settings import MOST_TILT, ReconstructSettings
+from rift_cl.commands.reconstruct.settings import ReconstructSettings
 from rift_cl.errors import InputError
 from rift_cl.geometry import Fan, Parallel, at_axis
 from rift_cl.geometry.length_units import length_unit
@@ -54,9 +56,6 @@ from rift_cl.reconstruct.preprocess import binned_center, binning_note, stitched
 from rift_cl.reconstruct.solvers.variation_weight import noise_of_rays
 
 Floats = NDArray[np.float32]
-# A tilt is turned where it moves the axis by so many bins between the middle row and the first; one
-# that is not sure is told from so many times its standard error.
-_TILT_MATTERS, _TOLD = 0.25, 2.0
 # The detector is continued by this share of its width on each side.
 _PAD_SHARE = 2
 # Noise below this share of the greatest line integral spoils nothing.
@@ -400,30 +399,6 @@ class SliceInput:
         if self.estimate is None:
             return {"center": self.center, "by": "search"}
         return self.estimate.record()
-
-
-def tilt_worth_turning(estimate: AxisEstimate, rows: int) -> float:
-    """The tilt that was found, in degrees, where it is sure and moves the axis; else 0."""
-    turns = estimate.tilt_is_sure and _moves(estimate, rows)
-    return math.degrees(math.atan(estimate.tilt)) if turns else 0.0
-
-
-def unsure_tilt(estimate: AxisEstimate, rows: int) -> list[str]:
-    """What is told of a tilt that would matter, and is not sure enough to turn projections."""
-    told = abs(estimate.tilt) > _TOLD * estimate.tilt_error and _moves(estimate, rows)
-    if estimate.tilt_is_sure or not told:
-        return []
-    tilt, error = (math.degrees(math.atan(slope)) for slope in (estimate.tilt, estimate.tilt_error))
-    does_so = f" (--tilt {tilt:.2g} does so)" if abs(tilt) <= MOST_TILT else ""
-    return [
-        f"The rows' axes lie about a line that tilts by {tilt:.2g} +- {error:.2g} degrees, from "
-        f"which they scatter {estimate.scatter:.2g} times as much as their errors explain: "
-        f"projections were not turned by it{does_so}."
-    ]
-
-
-def _moves(estimate: AxisEstimate, rows: int) -> bool:
-    return abs(estimate.tilt) * (rows - 1) / 2 >= _TILT_MATTERS
 
 
 def _notes_of(source: SliceInput) -> list[str]:
