@@ -3,9 +3,8 @@
 From one view to the next an object turns by a little, so that its projections change by a little.
 Where angles were matched to views in another order, as by files sorted by name (1, 10, 100, 2 ..),
 many neighbours have nothing in common, and views that the angles put far apart look alike instead.
-Where views are missing, where the object
-moved, and where a second pass begins, it is one pair alone that has nothing in common. Nothing of
-this hangs on the axis or the kind of beam.
+Where views are missing, where the object moved, and where a second pass begins, it is one pair
+alone. Nothing of this hangs on the axis or the kind of beam.
 """
 
 from __future__ import annotations
@@ -29,7 +28,6 @@ _STRANGE, _TIMES = 0.5, 3.0
 # Least share of such neighbours, and by how much others must match better in the other half of the
 # bins: as a share of the mismatch of most views, and in standard errors of the mean.
 _SHARE, _BETTER, _SURE = 0.07, 0.5, 7.0
-
 # Least mismatch of a pair that stands out, as a share of that of most views, and beside the next.
 _JUMP, _ALONE = 0.1, 8.0
 # By how much its angles may be further apart than those of most neighbours.
@@ -62,13 +60,13 @@ def order_doubt(views: Views, angles: Floats) -> str:
     away = np.minimum(apart, 2 * np.pi - apart) > _NEAR * np.ptp(around) / count
     # What matches best among many matches by chance as well: it is looked for in one half of the
     # bins and judged in the other, whose noise is another.
-    near, others = _mismatches(halves[0], chosen)
+    near, others = _from_next(halves[0])[chosen], _from_others(halves[0][chosen])
     most, others = np.median(others), np.where(away, others, np.inf)
     best = others.argmin(axis=1)
     strange = (near > _STRANGE * most) & (near > _TIMES * others.min(axis=1))
     if strange.mean() <= _SHARE:
         return ""
-    near, others = _mismatches(halves[1], chosen)
+    near, others = _from_next(halves[1])[chosen], _from_others(halves[1][chosen])
     better = (near - others[np.arange(len(chosen)), best])[strange]
     chance = _SURE * better.std() / np.sqrt(len(better))
     return WORDS if better.mean() > max(_BETTER * np.median(others), chance) else ""
@@ -89,14 +87,13 @@ def jump_doubt(views: Views, angles: Floats) -> str:
     order = np.argsort(angles, kind="stable")
     steps = np.diff(angles[order])
     halves = _halves(without_rings(views[order]))
-    each = np.arange(len(steps))
-    near = np.array([_mismatches(half, each)[0] for half in halves])
+    near = np.array([_from_next(half) for half in halves])
     at = int(near[0].argmax())
     rest = np.delete(near, at, axis=1)
     # A single view that went wrong makes two such pairs.
     alone = (near[:, at] > _ALONE * rest.max(axis=1)).all()
-    far = np.roll(each, len(each) // 2)
-    most = np.array([np.median(1 - (half[each] * half[far]).sum(axis=1)) for half in halves])
+    some = np.linspace(0, len(steps), min(len(steps), _MOST)).astype(int)
+    most = np.array([np.median(_from_others(half[some])) for half in halves])
     if not alone or steps[at] > _STEP * np.median(steps) or (near[:, at] < _JUMP * most).any():
         return ""
     first, second = sorted((int(order[at]), int(order[at + 1])))
@@ -125,10 +122,11 @@ def _normalised(slopes: Floats) -> Floats:
     return np.asarray(slopes / np.where(length > 0, length, 1))
 
 
-def _mismatches(slopes: Floats, chosen: NDArray[np.intp]) -> tuple[Floats, Floats]:
-    """Of each chosen view and the next one, and of all chosen ones with each other.
+def _from_next(slopes: Floats) -> Floats:
+    """Mismatch of each view and the next one: 0 where they are alike, 1 with nothing in common."""
+    return np.asarray(1 - (slopes[:-1] * slopes[1:]).sum(axis=1))
 
-    0 of views that are alike, 1 of such as have nothing in common.
-    """
-    one, after = slopes[chosen], slopes[chosen + 1]
-    return 1 - (one * after).sum(axis=1), 1 - one @ one.T
+
+def _from_others(slopes: Floats) -> Floats:
+    """The same of all views with each other."""
+    return np.asarray(1 - slopes @ slopes.T)
