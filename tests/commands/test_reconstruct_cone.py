@@ -46,6 +46,18 @@ def ball(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return path
 
 
+@pytest.mark.parametrize("center", [(CENTER, 9.5), (9.5, CENTER)])
+def test_a_row_and_a_bin_in_another_order_are_doubted(
+    ball: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], center: tuple[float, float]
+) -> None:
+    with np.load(ball) as made:
+        arrays = {name: made[name][:, :8] if made[name].ndim == 3 else made[name] for name in made}
+    np.savez(tmp_path / "few.npz", **arrays, center=center)
+    assert run("reconstruct", tmp_path / "few.npz", "--out", tmp_path / "a", "--size", "8") == 0
+    said = capsys.readouterr().err
+    assert ("off the detector's rows 0 to 7" in said) == (center[0] > 7.5)
+
+
 def middle_of(volume: np.ndarray) -> float:
     """Mean well inside the ball, whose middle is one voxel off the grid's or two."""
     z, y, x = np.indices(volume.shape) - (np.array(volume.shape)[:, None, None, None] - 1) / 2

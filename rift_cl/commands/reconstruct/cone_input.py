@@ -232,7 +232,7 @@ class ConeInput:
             lost = binning_note(rows, bins, rows=block, bins=n)
             averaged = f"Blocks of {block} x {n} (rows x bins) detector pixels were averaged."
             self.notes.append(f"{averaged} {lost}".rstrip())
-        self.notes += self.clean.notes() + self._pitch_note()
+        self.notes += self.clean.notes() + self._pitch_note() + self._orbit_note()
         if any(self.beyond):
             self.notes.append(self._beyond_note())
         if self.scan.background:
@@ -240,6 +240,17 @@ class ConeInput:
                 f"The mean of the outermost {self.scan.background} bins at each end (air) was "
                 "subtracted."
             )
+
+    def _orbit_note(self) -> list[str]:
+        """A doubt, where no row sees the plane of the source's orbit, which is seldom so."""
+        cone, rows = self.file.cone, self.file.shape[1]
+        if not isinstance(cone, Cone) or -0.5 <= cone.center[0] <= rows - 0.5:
+            return []
+        return [
+            f"Doubt: the geometry has the source's orbit at row {cone.center[0]:g}, off the "
+            f"detector's rows 0 to {rows - 1}: 'center' is the row of the orbit and then the bin "
+            "of the axis."
+        ]
 
     def _pitch_note(self) -> list[str]:
         """What takes the place of the file's pitch, which is seldom meant."""
