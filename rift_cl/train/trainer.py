@@ -398,7 +398,8 @@ class Trainer:
         if self.octaves is not None:
             target, weights = self.octaves.sized(target, weights)
         exposed = image if exposures is None else exposures.applied(image, number)
-        value, by_exposed = self.loss(exposed, target, weights=weights, view=number)
+        shrink = 1 if self.octaves is None else 2**self.octaves.level
+        value, by_exposed = self.loss(exposed, target, weights=weights, view=number, shrink=shrink)
         if (self.parameters.step + 1) % REPORT_EVERY == 0:
             self.loss.watch(exposed, target, weights=weights)
         if self.strategy.looks_at(self.parameters.step):

@@ -64,17 +64,15 @@ class CoverageWeight:
         self._target = Target(focus_of(cameras), field_diameter(cameras))
         self._tables: dict[int, NDArray[np.float32]] = {}
 
-    def response(self, view: int, exponent: float, height: int | None = None) -> Response:
+    def response(self, view: int, exponent: float, shrink: int = 1) -> Response:
         """The weight of a view's image frequencies, in cycles per pixel.
 
-        ``height`` is that of an image which was made smaller by a whole factor.
+        ``shrink`` is how many of the camera's pixels a pixel is long.
         """
         table, diminishing_returns = self._table(view), self._diminishing_returns(view)
-        full = self._cameras[view].height
-        factor = round(full / (height or full))
 
         def weight(ky: Floats, kx: Floats) -> Floats:
-            ky, kx = ky / factor, kx / factor
+            ky, kx = ky / shrink, kx / shrink
             radius = np.arcsinh(np.hypot(ky, kx) / diminishing_returns) / np.arcsinh(
                 _LARGEST / diminishing_returns
             )

@@ -78,18 +78,19 @@ class HomogenisedLoss:
         return round(share * _PARTS) / _PARTS * most
 
     def __call__(
-        self, image: Any, target: Any, *, weights: Any = None, view: int = 0
+        self, image: Any, target: Any, *, weights: Any = None, view: int = 0, shrink: int = 1
     ) -> tuple[Any, Any]:
         """The loss, (1,), and its weighted gradient, as ``ImageLoss`` gives them.
 
         The ramp spreads a residual; what comes to lie on pixels that do not count is left out.
-        ``view`` is the picture's number, which coverage hangs on.
+        ``view`` is the picture's number, which coverage hangs on, and ``shrink`` how many of its
+        camera's pixels one of the image is long.
         """
         exponent = self.exponent
         if exponent == 0:
             return self._plain(self.device, image, target, weights=weights)
         value, gradient = self._pixels(self.device, image, target, weights=weights)
-        ramp = self._filter(image.shape[:2], exponent, view)
+        ramp = self._filter(image.shape[:2], exponent, view, shrink)
         gradient = ramp(gradient, channels=target.shape[2], mask=weights, keep_norm=True)
         share = self._plain.ssim_weight
         if share:
@@ -115,14 +116,16 @@ class HomogenisedLoss:
         """Go on from a checkpoint."""
         self.mean_square, self.noise = float(state["mean_square"]), float(state["noise"])
 
-    def _filter(self, size: tuple[int, ...], exponent: float, view: int) -> SpectralFilter:
+    def _filter(
+        self, size: tuple[int, ...], exponent: float, view: int, shrink: int
+    ) -> SpectralFilter:
         """The filter of a view's image, kept while the exponent holds."""
         if exponent != self._filtered:
             self._filters, self._filtered = {}, exponent
         key = size, 0 if self.coverage is None else view
         if key in self._filters:
             return self._filters[key]
-        response = self._response(size, exponent, view)
+        response = self._response(size, exponent, view, shrink)
         if size in self._shapes:
             found = self._shapes[size].with_response(response)
         else:
@@ -132,7 +135,7 @@ class HomogenisedLoss:
             self._filters[key] = found
         return found
 
-    def _response(self, size: tuple[int, ...], exponent: float, view: int) -> Response:
+    def _response(self, size: tuple[int, ...], exponent: float, view: int, shrink: int) -> Response:
         if self.coverage is not None:
-            return self.coverage.response(view, exponent, size[0])
+            return self.coverage.response(view, exponent, shrink)
         return partial(self.settings.response, longest=max(size), exponent=exponent)
