@@ -111,7 +111,8 @@ def _bright(lines: Floats, row: int) -> list[str]:
 
 def _weak_beam(scan: ScanFile, lines: Floats) -> list[str]:
     """Both ends of the detector off zero by as much in all views and all their bins, as air is."""
-    if scan.background:
+    # Of other kinds the scan's own notes say so.
+    if scan.background or scan.kind != "counts":
         return []
     count = max(2, round(_END * lines.shape[1]))
     ends = lines[:, :count], lines[:, -count:]
