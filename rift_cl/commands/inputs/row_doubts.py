@@ -38,19 +38,18 @@ def row_doubts(scan: ScanFile, row: int, found: Attenuation) -> list[str]:
         row: which.
         found: its line integrals, as they are worked on.
     """
-    lines = found.projections[:, 0]
-    notes = _dark_views(lines) + _starved(found, row)
+    # Line integrals of others may be in any unit, and have no frames.
     if scan.kind == "attenuation":
-        return notes
-    frames = scan.read(row, row + 1)
+        return []
+    lines, frames = found.projections[:, 0], scan.read(row, row + 1)
     told = _frames(frames) or _bright(lines, row) or _weak_beam(scan, lines)
-    return notes + told
+    return _dark_views(lines) + _starved(found, row) + told
 
 
 def _dark_views(lines: Floats) -> list[str]:
     """Views in which no bin sees what it usually does."""
-    light = np.percentile(np.exp(-np.minimum(lines, 50)), 95, axis=1)
-    dark = np.flatnonzero(light < _NO_BEAM * np.median(light))
+    brightest = np.percentile(lines, 5, axis=1)
+    dark = np.flatnonzero(brightest > np.median(brightest) - np.log(_NO_BEAM))
     if not 0 < len(dark) < len(lines) / 2:
         return []
     where = f"view {dark[0]}" if len(dark) == 1 else f"views {dark[0]} to {dark[-1]}"
@@ -102,10 +101,11 @@ def _bright(lines: Floats, row: int) -> list[str]:
     share = float((mean < -np.log(_BRIGHT)).mean())
     if share <= _BRIGHT_SHARE:
         return []
+    most = np.exp(min(-float(mean.min()), 50))
     return [
-        f"Doubt: {100 * share:.0f} % of row {row} is brighter than the open beam, up to "
-        f"{np.exp(-float(mean.min())):.3g} times: the flats were taken with a weaker beam or with "
-        "the object in it, or the values are inverted."
+        f"Doubt: {100 * share:.0f} % of row {row} is brighter than the open beam, up to {most:.3g} "
+        "times: the flats were taken with a weaker beam or with the object in it, or the values "
+        "are inverted."
     ]
 
 
