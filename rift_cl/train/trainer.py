@@ -51,7 +51,8 @@ _BAND_EVERY = _NORMALS_EVERY = 100
 # What a step costs beside its splats, and what it does for a pixel of each splat that there may be;
 # what harmonics of degree 1 add to a splat, and what each further degree adds, all in the cost of
 # as many splats of one color as there may be. Fitted to the times of steps on PoCL
-# (``tools/time_left.py``).
+# (``tools/time_left.py``) with 1.2 pixels to a splat. How the first two share that is a guess,
+# which matters where images are halved: at a tenth of such a run what was told was 13 to 41 % off.
 _STEP, _PIXEL, _FIRST_DEGREE, _NEXT_DEGREE = 0.5, 0.1, 0.5, 0.25
 # Splats begin large, so each covers more pixels: what the first step costs more, as a share, and
 # how much of that is left one step later. Fitted to the same times.

@@ -87,6 +87,13 @@ def test_nothing_is_said_of_counts_that_are_right(lines, tmp_path, capsys, scale
     assert "Doubt" not in said(tmp_path, capsys, frames(scale * lines))
 
 
+@pytest.mark.parametrize("flats", ["mean", "air"])
+def test_nothing_is_said_of_a_beam_that_the_views_themselves_tell(lines, tmp_path, capsys, flats):
+    made = frames(lines)
+    del made["data_white"]
+    assert "Doubt" not in said(tmp_path, capsys, made, "--flats", flats)
+
+
 def test_the_remedy_that_is_named_ends_the_doubt(lines, tmp_path, capsys):
     weaker = frames(lines, 0.7 * BEAM)
     assert "--background 5 brings it to zero" in said(tmp_path, capsys, weaker)

@@ -144,7 +144,8 @@ class XrayInput:
         Raises:
             InputError: nothing is attenuated.
         """
-        integrals = read_attenuation(self.scan, *self.rows).projections
+        found = read_attenuation(self.scan, *self.rows)
+        integrals = found.projections
         scale = float(np.quantile(integrals, _STRONG))
         if scale <= 0:
             raise InputError(
@@ -153,7 +154,7 @@ class XrayInput:
             )
         values, geometry = integrals / np.float32(scale), self._geometry()
         middle = sum(self.rows) // 2
-        self.notes += row_doubts(self.scan, middle, read_attenuation(self.scan, middle, middle + 1))
+        self.notes += row_doubts(self.scan, middle, found.of_row(middle - self.rows[0]))
         return Projections(geometry, values, scale)
 
     def _geometry(self) -> Parallel | Cone | Vectors:

@@ -42,7 +42,10 @@ def row_doubts(scan: ScanFile, row: int, found: Attenuation) -> list[str]:
     if scan.kind == "attenuation":
         return []
     lines, frames = found.projections[:, 0], scan.read(row, row + 1)
-    told = _frames(frames) or _bright(lines, row) or _weak_beam(scan, lines)
+    told = _frames(frames)
+    # Counts over the mean of each view say nothing of the level of the beam.
+    if frames.flats is not None or scan.kind == "transmission" or scan.background:
+        told = told or _bright(lines, row) or _weak_beam(scan, lines)
     return _dark_views(lines) + _starved(found, row) + told
 
 

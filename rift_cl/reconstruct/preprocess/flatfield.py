@@ -58,6 +58,12 @@ class Attenuation:
     starved_of_rows: Counts
     dead_bins: tuple[int, ...] = ()
 
+    def of_row(self, row: int) -> Attenuation:
+        """Those of one row, which keeps its axis; bins are those of all rows."""
+        one = slice(row, row + 1)
+        counts = self.dead_of_rows[one], self.starved_of_rows[one]
+        return Attenuation(self.projections[:, one], *counts, self.dead_bins)
+
     @property
     def dead(self) -> int:
         """Detector pixels that were filled from their neighbours."""
