@@ -84,8 +84,23 @@ VARIANTS: dict[str, Settings] = {
     "opacities penalised": {"strategy.opacity_penalty": 0.01},
     "cooldown 0.25": {"cooldown": 0.25},
     "relocations / 2": {"strategy.first": 200, "strategy.every": 100, "strategy.relocations": 25},
-    "contribution / 2": times(0.5, "strategy.min_contribution"),
-    "contribution x 2": times(2, "strategy.min_contribution"),
+    **{
+        f"contribution {first:g} to {last:g}": {
+            "strategy.min_contribution": first,
+            "strategy.min_contribution_last": last,
+        }
+        for first, last in (
+            (0.05, 0.05),
+            (0.1, 0.1),
+            (0.2, 0.2),
+            (0.2, 0.1),
+            (0.2, 0.05),
+            (0.2, 0.0),
+            (0.3, 0.05),
+            (0.4, 0.1),
+            (0.4, 0.0),
+        )
+    },
     "lobes": _LOBES,
     "lobes, mcmc": {**_LOBES, **_MCMC},
     "lobes, moves x 2": times(2, *_MOVES, of=_LOBES),

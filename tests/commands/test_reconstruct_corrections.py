@@ -163,6 +163,28 @@ def test_a_tilted_axis_is_made_upright(tmp_path):
     assert "turned by 4.000 degrees" in notes(tmp_path / "right")
 
 
+def test_a_tilt_that_the_rows_contradict_is_doubted(tmp_path):
+    said = {}
+    for degrees in (0.0, 4.0):
+        path = tilted_counts(tmp_path / f"{degrees:g}.h5", degrees)
+        for name, more in {
+            "0": ("--tilt", 0),
+            "4": ("--tilt", 4),
+            "center": ("--center", 39.5),
+            "both": ("--center", 39.5, "--tilt", 4),
+            "one row": ("--center", 39.5, "--rows", ROWS // 2, ROWS // 2 + 1),
+        }.items():
+            out = tmp_path / f"out {degrees:g} {name}"
+            reconstruct(path, out, *more)
+            said[degrees, name] = "Doubt: the rows' axes lean by" in notes(out)
+    assert {case for case, doubted in said.items() if doubted} == {
+        (0.0, "4"),
+        (0.0, "both"),
+        (4.0, "0"),
+        (4.0, "center"),
+    }
+
+
 def test_the_center_command_names_the_tilt_that_its_bin_leaves_out(tmp_path, capsys):
     for degrees in (4.0, 0.0):
         path = tilted_counts(tmp_path / f"{degrees:g}.h5", degrees)

@@ -39,7 +39,9 @@ def said(tmp_path, capsys, made, *more):
             file[f"exchange/{name}"] = np.clip(values, 0, 65535).astype(np.uint16)
         file["exchange/theta"] = np.rad2deg(ANGLES)
     words = ["reconstruct", str(tmp_path / "scan.h5"), "--out", str(tmp_path / "out"), *more]
-    assert main([*words, "--center", str((BINS - 1) / 2)]) == 0
+    if "--center" not in words:
+        words += ["--center", str((BINS - 1) / 2)]
+    assert main(words) == 0
     return capsys.readouterr().err
 
 
@@ -92,6 +94,15 @@ def test_nothing_is_said_of_a_beam_that_the_views_themselves_tell(lines, tmp_pat
     made = frames(lines)
     del made["data_white"]
     assert "Doubt" not in said(tmp_path, capsys, made, "--flats", flats)
+
+
+def test_an_object_that_reaches_into_what_is_taken_for_air_is_told(lines, tmp_path, capsys):
+    whole = frames(lines)
+    cut = {name: whole[name][..., 20:-20] for name in ("data", "data_dark")}
+    more = ("--flats", "air", "--center", str((BINS - 41) / 2))
+    assert "bins at the two ends of the detector, which the beam is" in said(
+        tmp_path, capsys, cut, *more
+    )
 
 
 def test_the_remedy_that_is_named_ends_the_doubt(lines, tmp_path, capsys):

@@ -112,6 +112,25 @@ def test_an_axis_off_the_middle_is_not_pulled_towards_it(offset, angles):
     assert found.center == pytest.approx(center, abs=0.1)
 
 
+@pytest.mark.parametrize("noise", [0.0, 1e-4, 1e-3])
+def test_half_acquisitions_with_hardly_any_noise_tell_their_axis(noise):
+    """Their likelihood is so sharp that a coarse step misses where it bends the right way."""
+    parts = [
+        (1.0, 0, 0, 80, 64, 0.35),
+        (0.8, 28, 8, 16, 24, -0.52),
+        (-0.6, -32, 20, 18, 12, 0.87),
+        (2.0, -8, -36, 10, 10, 0),
+        (1.5, 44, -20, 6, 11, 0.17),
+    ]
+    for center in (11.7, 16.7, 31.7):
+        shifts = (np.arange(4) - 1.5) / 4
+        bins = round(center + 124.6)
+        averaged = np.mean(
+            [sinogram(parts, FULL, center + shift, bins=bins, noise=noise) for shift in shifts], 0
+        )
+        assert find_center(averaged, FULL).center == pytest.approx(center, abs=0.02)
+
+
 @pytest.mark.parametrize("span", [90, 120, 150])
 def test_limited_angles_are_told_by_the_centres_of_mass(span):
     angles = np.deg2rad(np.arange(0, span, 0.5))

@@ -26,6 +26,9 @@ _FULL_SHARE = 0.02
 # Level of both ends of the detector that is worth a doubt, as a share of the largest line integral,
 # and by how much of it ends may differ from each other, from view to view and along their bins.
 _OFF, _ALIKE, _END = 0.03, 0.1, 1 / 20
+# Views over which both ends are averaged before they are compared, and by how much the difference
+# of ends that are taken for air may change over the views, as a share of the largest line integral.
+_BLUR, _CHANGE = 5, 0.05
 # Codes up to which detectors count.
 _FULL = tuple(float(2**bits - 1) for bits in (8, 10, 12, 14, 16))
 
@@ -46,7 +49,7 @@ def row_doubts(scan: ScanFile, row: int, found: Attenuation) -> list[str]:
     # Counts over the mean of each view say nothing of the level of the beam.
     if frames.flats is not None or scan.kind == "transmission" or scan.background:
         told = told or _bright(lines, row) or _weak_beam(scan, lines)
-    return _dark_views(lines) + _starved(found, row) + told
+    return _dark_views(lines) + _starved(found, row) + (told or _no_air(scan, lines))
 
 
 def _dark_views(lines: Floats) -> list[str]:
@@ -129,4 +132,27 @@ def _weak_beam(scan: ScanFile, lines: Floats) -> list[str]:
     return [
         f"Doubt: both ends of the detector read {level:.3g} in all views alike, as air does where "
         f"the beam was weaker than in the flats: --background {count} brings it to zero."
+    ]
+
+
+def _no_air(scan: ScanFile, lines: Floats) -> list[str]:
+    """Ends that the beam is taken from, and that change against each other from view to view.
+
+    The beam of a view is one for both ends, however it changes; what turns is not.
+    """
+    from scipy.ndimage import uniform_filter1d
+
+    count = scan.background
+    if not count or len(lines) < _BLUR:
+        return []
+    apart = lines[:, :count].mean(axis=1) - lines[:, -count:].mean(axis=1)
+    change = float(uniform_filter1d(apart, _BLUR, mode="nearest").std())
+    most = float(np.ptp(lines))
+    if change <= _CHANGE * most:
+        return []
+    return [
+        f"Doubt: the outermost {count} bins at the two ends of the detector, which the beam is "
+        f"taken from as air, change against each other by {100 * change / most:.0f} % of the "
+        "largest line integral from view to view: the object reaches into them; give flats, or "
+        "--flats mean."
     ]

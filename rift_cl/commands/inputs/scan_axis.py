@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -194,6 +194,28 @@ def unsure_tilt(estimate: AxisEstimate, rows: int) -> list[str]:
         f"The rows' axes lie about a line that tilts by {tilt:.2g} +- {error:.2g} degrees, from "
         f"which they scatter {estimate.scatter:.2g} times as much as their errors explain: "
         f"projections were not turned by it{does_so}."
+    ]
+
+
+def doubted_tilt(estimate: AxisEstimate, rows: int, given: float) -> list[str]:
+    """A doubt where the rows' axes lean otherwise than a person says, so that slices blur.
+
+    Args:
+        estimate: what the data tell.
+        rows: of the detector that slices are made of.
+        given: degrees by which projections are turned; 0 where they are not.
+    """
+    other = replace(estimate, tilt=estimate.tilt - math.tan(math.radians(given)))
+    # The scatter about the line is that of what was found.
+    surely = abs(other.tilt) > estimate.times_sure * estimate.tilt_error
+    if not (surely and _moves(other, rows)):
+        return []
+    tilt, error = (math.degrees(math.atan(slope)) for slope in (estimate.tilt, estimate.tilt_error))
+    said = f"--tilt {given:g}" if given else "without --tilt"
+    most = abs(other.tilt) * (rows - 1) / 2
+    return [
+        f"Doubt: the rows' axes lean by {tilt:.2f} +- {error:.2f} degrees, and projections were "
+        f"turned by {given:g} ({said}): the axis is {most:.2g} bins off in the outermost slices."
     ]
 
 

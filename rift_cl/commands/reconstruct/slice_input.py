@@ -21,6 +21,7 @@ from rift_cl.commands.inputs.scan_axis import (
     SettledAxis,
     doubted_center,
     doubted_circle,
+    doubted_tilt,
     find_axis,
     settled_axis,
     tilt_worth_turning,
@@ -35,14 +36,14 @@ from rift_cl.commands.inputs.scan_rows import (
 from rift_cl.commands.reconstruct.binned_file import binned_file, row_binning
 from rift_cl.commands.reconstruct.clean_rows import Alignment, CleanRows, LoadedRows
 from rift_cl.commands.reconstruct.settings import ReconstructSettings
-from rift_cl.errors import InputError
+from rift_cl.errors import InputError, RiftError
 from rift_cl.geometry import Fan, Parallel, at_axis
 from rift_cl.geometry.length_units import length_unit
 from rift_cl.io.number_list import read_numbers
 from rift_cl.io.scans.scan_file import ScanFile
 from rift_cl.reconstruct import Attenuation
 from rift_cl.reconstruct.axis import AxisEstimate
-from rift_cl.reconstruct.axis.search import angle_doubt, axis_of_rows
+from rift_cl.reconstruct.axis.search import angle_doubt
 from rift_cl.reconstruct.direct.fan_rebin import covered_rays, rebin_fan
 from rift_cl.reconstruct.direct.offset_axis import (
     is_full_turn,
@@ -205,30 +206,33 @@ class SliceInput:
             self.notes.append(_dead_note(read.dead_bins, middle))
 
     def _doubts(self, row: Floats) -> list[str]:
-        """What the middle row has against the angles, and against an axis that was given."""
+        """What the data have against the angles, and against an axis that was given."""
         given = self.settings.center
         if self.fan is not None:
             return [] if given is None else doubted_circle(self.file, given, self.device)
         found = None
         if given is not None:
-            with suppress(InputError):  # data that do not tell the axis have nothing against one
-                found = axis_of_rows([row], [0], 1, self.scan.angles)
+            with suppress(RiftError):  # data that do not tell the axis have nothing against one
+                found = find_axis(self.file, self.device)
         doubt = angle_doubt(row, self.scan.angles) if found is None else found.doubt
         doubts = [f"Doubt: {doubt}."] if doubt else []
         if found is None or given is None:
             return doubts
-        return doubts + doubted_center(self._at_middle(found), given)
+        tilt = doubted_tilt(found, self.spanned, self.tilt)
+        return doubts + doubted_center(self._at_middle(found), given) + tilt
+
+    @property
+    def spanned(self) -> int:
+        """How many of the file's rows lie between the outermost slices, these included."""
+        return (self.rows[1] - self.rows[0]) * row_binning(self.file, self.settings.binning)
 
     def _at_middle(self, found: AxisEstimate) -> AxisEstimate:
-        """What the middle row of the slices tells, for the middle of the detector as it is."""
-        binning, block = self.settings.binning, row_binning(self.file, self.settings.binning)
-        away = sum(self.rows) // 2 - binned_center((self.file.shape[1] - 1) / 2, block)
-        moved = math.tan(math.radians(self.tilt)) * away
-        center, low, high = (
-            # The inverse of binned_center.
-            (place - moved) * binning + (binning - 1) / 2
-            for place in (found.center, *found.interval)
-        )
+        """What the data tell of the middle slice, for the middle of the detector."""
+        block = row_binning(self.file, self.settings.binning)
+        away = block * (sum(self.rows) // 2 - binned_center((self.file.shape[1] - 1) / 2, block))
+        tilt = found.tilt if found.tilt_is_sure else 0.0
+        moved = (tilt - math.tan(math.radians(self.tilt))) * away
+        center, low, high = (place + moved for place in (found.center, *found.interval))
         return dataclasses.replace(found, center=center, interval=(low, high))
 
     def _noise_note(self, row: Floats) -> list[str]:
@@ -446,8 +450,11 @@ def _axis_note(source: SliceInput) -> list[str]:
         return list(source.settled_by.notes)
     if source.estimate is None:
         return [f"The rotation axis was found before, at bin {source.center:.2f}."]
-    rows, said = source.file.shape[1], source.settings.tilt is not None
-    tilt = [] if said else unsure_tilt(source.estimate, rows)
+    rows, said = source.file.shape[1], source.settings.tilt
+    if said is None:
+        tilt = unsure_tilt(source.estimate, rows)
+    else:
+        tilt = doubted_tilt(source.estimate, source.spanned, said)
     return [f"The rotation axis was found {source.estimate.in_words()}.", *tilt]
 
 

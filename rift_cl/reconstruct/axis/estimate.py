@@ -81,8 +81,12 @@ class AxisEstimate:
         Angles that are a little wrong move the centres of rows by what these happen to show, so
         that some lie near a slope by chance; but they scatter about it by more than their errors.
         """
-        times = _SURE if self.scatter <= 1 else _SURE_OF_SCATTERED
-        return abs(self.tilt) > times * self.tilt_error
+        return abs(self.tilt) > self.times_sure * self.tilt_error
+
+    @property
+    def times_sure(self) -> float:
+        """Of how many standard errors a tilt is sure."""
+        return _SURE if self.scatter <= 1 else _SURE_OF_SCATTERED
 
     def in_words(self) -> str:
         """Where the axis is, how surely, and what told it."""

@@ -40,9 +40,9 @@ _HALF, _OVERLAP, _OVERLAP_BINS = 0.2, 0.03, 8
 _COARSE, _FINE, _VIEWS = 256, 512, 1.4
 # Distance of windows about trial centres, as a share of the detector.
 _WINDOWS = 1 / 32
-# Step of trial centres all over the detector and next to the best, and how far the latter go, in
-# bins of the row.
-_STEP, _NARROW, _REACH = 0.25, 0.1, 2.0
+# Step of trial centres all over the detector, next to the best and, as views without noise tell
+# centres so sharply, next to the best of these, in bins of the row; and how far the second go.
+_STEP, _NARROW, _SHARP, _REACH = 0.25, 0.1, 0.005, 2.0
 # Places that are followed, and their least distance as a share of the detector.
 _FOLLOWED, _APART = 8, 0.012
 # How far to either side of a place the fine search begins, in bins of the row.
@@ -290,11 +290,16 @@ def _peaks(centers: Floats, scores: Floats, apart: float) -> Floats:
 def _followed(row: Row, look: Look, start: float, by: str) -> RowAxis:
     """The centre that a place leads to, with the window and the noise taken about it."""
     center, last = start, 0.0
-    trial = row.bin * np.arange(-_REACH, _REACH + _NARROW / 2, _NARROW)
+    trials = [
+        row.bin * np.arange(-reach, reach + step / 2, step)
+        for reach, step in ((_REACH, _NARROW), (_NARROW, _SHARP))
+    ]
     for _ in range(_ROUNDS):
         told = look(row.place(center), row.place(center))
-        best = center + trial[told.scores(center + trial).argmax()]
-        change = told.peak(float(best)) - center
+        best = center
+        for trial in trials:
+            best += float(trial[told.scores(best + trial).argmax()])
+        change = told.peak(best) - center
         found = center + change
         ratio = change / last if last else 0.0
         if abs(change) < _SETTLED * row.bin:

@@ -76,15 +76,18 @@ class ResidualSettings(GrowthSettings):
     """Training views before a relocation that say what each splat contributes: those of so many
     steps, or of all since the last relocation where these are fewer."""
     min_contribution: float = 0.1
-    """Contribution up to which a splat is relocated, as a fraction of the median contribution: how
-    many pixels it makes up in a view that looks at it."""
+    """Contribution up to which a splat is relocated at the start, as a fraction of the median
+    contribution: how many pixels it makes up in a view that looks at it."""
+    min_contribution_last: float = 0.1
+    """The same at the last relocation; in between it changes in proportion to the steps."""
 
     def __post_init__(self) -> None:
         """Check every number's range."""
         super().__post_init__()
         check_whole(self, "relocations", 1)
         check_whole(self, "views", 1)
-        check_number(self, "min_contribution", most=1)
+        for name in ("min_contribution", "min_contribution_last"):
+            check_number(self, name, most=1)
 
     def begin(self, parameters: Parameters, run: TrainingRun) -> ResidualStrategy:
         """The strategy of a run; see ``StrategySettings``."""
@@ -206,6 +209,12 @@ class ResidualStrategy(GrowthStrategy):
         """As many steps as leave a long run no more relocations than there may be."""
         return max(self.settings.every, ceil(self.run.steps / self.settings.relocations))
 
+    def min_contribution(self, step: int) -> float:
+        """Contribution up to which a splat is relocated at a step, as a fraction of the median."""
+        settings = self.settings
+        way = min(1.0, step / max(1.0, settings.last * self.run.steps))
+        return (1 - way) * settings.min_contribution + way * settings.min_contribution_last
+
     def relocates_at(self, step: int) -> bool:
         """Not beyond a fraction of the run either."""
         return super().relocates_at(step) and step < self.settings.last * self.run.steps
@@ -239,7 +248,7 @@ class ResidualStrategy(GrowthStrategy):
                 parameters,
                 self.contributions.host(),
                 min_opacity=settings.min_opacity,
-                min_contribution=settings.min_contribution,
+                min_contribution=self.min_contribution(step),
                 added=grown(len(parameters), self.growth(step, len(parameters)), self.run.splats),
                 seed=self.run.seed,
             )
