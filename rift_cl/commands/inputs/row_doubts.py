@@ -45,11 +45,11 @@ def row_doubts(scan: ScanFile, row: int, found: Attenuation) -> list[str]:
     if scan.kind == "attenuation":
         return []
     lines, frames = found.projections[:, 0], scan.read(row, row + 1)
-    told = _frames(frames)
+    told = _frames(frames) or _no_air(scan, lines)
     # Counts over the mean of each view say nothing of the level of the beam.
     if frames.flats is not None or scan.kind == "transmission" or scan.background:
         told = told or _bright(lines, row) or _weak_beam(scan, lines)
-    return _dark_views(lines) + _starved(found, row) + (told or _no_air(scan, lines))
+    return _dark_views(lines) + _starved(found, row) + told
 
 
 def _dark_views(lines: Floats) -> list[str]:
