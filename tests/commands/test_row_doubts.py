@@ -51,6 +51,12 @@ def _dark_views(lines):
     return made
 
 
+def _open_views(lines):
+    made = frames(lines)
+    made["data"][5::40] = np.random.default_rng(1).poisson(BEAM, (3, 2, BINS)) + DARK
+    return made
+
+
 def _dark_flats(lines):
     made = frames(lines)
     made["data_white"][:3] = made["data_dark"][:3]
@@ -68,7 +74,8 @@ def _saturated(lines):
 
 
 WRONG = {
-    "no beam": (_dark_views, "20 of 120 views have next to no beam .views 70 to 89"),
+    "no beam": (_dark_views, "20 of 120 views have next to no beam .views 70, 71, 72, 73, 74, 75, ..."),
+    "flats between": (_open_views, "3 of 120 views show next to nothing .* .views 5, 45, 85"),
     "starved": (lambda lines: frames(6 * lines, BEAM), "of row 1 have no signal above"),
     "dark flats": (_dark_flats, "the flats read .* above the darks: some of them"),
     "sample in flats": (_sample_in_flats, "of row 1 is brighter than the open beam"),

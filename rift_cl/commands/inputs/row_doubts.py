@@ -15,6 +15,9 @@ from rift_cl.reconstruct.preprocess.flatfield import Attenuation
 Floats = NDArray[np.float32]
 # Share of the usual brightness below which a view has no beam.
 _NO_BEAM = 0.05
+# Share of the usual sum of line integrals below which a view shows no object, least mean of a view
+# as a share of the largest line integrals, and most numbers of views that are listed.
+_NO_OBJECT, _SHOWN, _LISTED = 0.2, 0.02, 6
 # Share of samples without a signal that is worth a sentence.
 _STARVED = 0.01
 # Transmission that nothing explains, in the mean of neighbouring samples, and the share of them.
@@ -49,7 +52,7 @@ def row_doubts(scan: ScanFile, row: int, found: Attenuation) -> list[str]:
     # Counts over the mean of each view say nothing of the level of the beam.
     if frames.flats is not None or scan.kind == "transmission" or scan.background:
         told = told or _bright(lines, row) or _weak_beam(scan, lines)
-    return _dark_views(lines) + _starved(found, row) + told
+    return _dark_views(lines) + _open_views(lines) + _starved(found, row) + told
 
 
 def _dark_views(lines: Floats) -> list[str]:
@@ -58,11 +61,33 @@ def _dark_views(lines: Floats) -> list[str]:
     dark = np.flatnonzero(brightest > np.median(brightest) - np.log(_NO_BEAM))
     if not 0 < len(dark) < len(lines) / 2:
         return []
-    where = f"view {dark[0]}" if len(dark) == 1 else f"views {dark[0]} to {dark[-1]}"
+    where = f"view {dark[0]}" if len(dark) == 1 else f"views {_listed(dark)}"
     return [
         f"Doubt: {len(dark)} of {len(lines)} views have next to no beam ({where}): the shutter was "
         "shut, or they are darks; leave them out, with their angles."
     ]
+
+
+def _open_views(lines: Floats) -> list[str]:
+    """Views in which the object is missing: its line integrals sum up to as much in all of them."""
+    sums = lines.mean(axis=1)
+    usual = float(np.median(sums))
+    if usual <= _SHOWN * float(np.percentile(lines, 99)):
+        return []
+    empty = np.flatnonzero(sums < _NO_OBJECT * usual)
+    if not len(empty):
+        return []
+    where = f"view {empty[0]}" if len(empty) == 1 else f"views {_listed(empty)}"
+    return [
+        f"Doubt: {len(empty)} of {len(lines)} views show next to nothing of the object ({where}): "
+        "they are flats; leave them out, with their angles."
+    ]
+
+
+def _listed(numbers: NDArray[np.intp]) -> str:
+    """The first of some numbers, and that there are more."""
+    shown = ", ".join(str(number) for number in numbers[:_LISTED])
+    return shown if len(numbers) <= _LISTED else f"{shown}, ..."
 
 
 def _starved(found: Attenuation, row: int) -> list[str]:
