@@ -1,14 +1,16 @@
-"""Which settings of ``rift fit photos`` serve: one change at a time, several captures and seeds.
+"""Which settings of ``rift fit`` serve: one change at a time, several captures and seeds.
 
     python tools/search_defaults.py capture/ornament capture/lego --steps 500 --out search
     python tools/search_defaults.py capture/ornament --variants 0.1 defaults --seeds 0 1 2
+    python tools/search_defaults.py tooth/tooth.h5 walnut/walnut_cone.npz --kind xray --steps 500
     python tools/search_defaults.py --out search --markdown docs/benchmarks/defaults.md
 
 Every eighth view of a capture is held out and scored; views that a final judgement is to be made on
 must not be among them, so give captures without those. Each fit leaves its scores in --out, and
 a search that is stopped goes on where it was; without captures nothing is fitted. The tables are of
 all fits in --out: the mean PSNR of the held-out views, its spread over the seeds, the gain over the
-defaults of 0.1.0, and processor seconds, of all variants that were tried, the losing ones too.
+defaults of 0.1.0 (photographs) or of today (X-rays), and processor seconds, of all variants that
+were tried, the losing ones too.
 """
 
 from __future__ import annotations
@@ -20,7 +22,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from statistics import mean
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 import tyro
 from tyro.conf import Positional
@@ -31,15 +33,18 @@ from bench.surroundings import in_words, surroundings
 from bench.table import NONE, Table, markdown_lines, show
 from rift_cl.commands.fit_photos.presets import PRESETS
 from rift_cl.commands.fit_photos.settings import FitPhotosSettings
+from rift_cl.commands.fit_xray.settings import FitXraySettings
 from rift_cl.commands.run_folder.saved_settings import options_of
 from rift_cl.io import write_text
 
 Settings = Mapping[str, Any]
+Kind = Literal["photos", "xray"]
 # What all gains are over.
-BASE = "0.1"
-_USUAL = {
-    option.name: option.value for option in options_of(FitPhotosSettings.of(Path("x"), Path("y")))
-}
+BASES: dict[Kind, str] = {"photos": "0.1", "xray": "defaults"}
+_PHOTOS, _XRAY = (
+    {option.name: option.value for option in options_of(settings.of(Path("x"), Path("y")))}
+    for settings in (FitPhotosSettings, FitXraySettings)
+)
 _MEANS = "learning_rates.means"
 _SHAPES = ("learning_rates.log_scales", "learning_rates.quats")
 _SCALES = "strategy.scale_penalty"
@@ -47,16 +52,18 @@ _SCALES = "strategy.scale_penalty"
 _MCMC = {"strategy": "mcmc"}
 
 
-def times(factor: float, *names: str, of: Settings | None = None) -> Settings:
+def times(
+    factor: float, *names: str, of: Settings | None = None, usual: Settings = _PHOTOS
+) -> Settings:
     """Settings in which some values are larger by a factor than in others, or by default."""
     begun = {} if of is None else dict(of)
-    return {**begun, **{name: factor * begun.get(name, _USUAL[name]) for name in names}}
+    return {**begun, **{name: factor * begun.get(name, usual[name]) for name in names}}
 
 
 _MOVES = (_MEANS, *_SHAPES)
 _LOBES = PRESETS["lobes"]
-VARIANTS: dict[str, Settings] = {
-    BASE: PRESETS["0.1"],
+_OF_PHOTOS: dict[str, Settings] = {
+    "0.1": PRESETS["0.1"],
     "defaults": {},
     "moves x 2": times(2, *_MOVES),
     "moves / 2": times(0.5, *_MOVES),
@@ -98,7 +105,6 @@ VARIANTS: dict[str, Settings] = {
             (0.2, 0.0),
             (0.3, 0.05),
             (0.4, 0.1),
-            (0.4, 0.0),
         )
     },
     "lobes": _LOBES,
@@ -112,32 +118,59 @@ VARIANTS: dict[str, Settings] = {
     "lobes, learned / 2": times(0.5, "learning_rates.lobes", of=_LOBES),
     "4 lobes": {**_LOBES, "modes": 4},
 }
+_LOGITS = "learning_rates.logits"
+_OF_XRAYS: dict[str, Settings] = {
+    "defaults": {},
+    **{
+        f"{name} {word}": times(factor, *changed, usual=_XRAY)
+        for name, changed in (
+            ("positions", (_MEANS,)),
+            ("scales and rotations", _SHAPES),
+            ("densities", (_LOGITS,)),
+            ("all", (_MEANS, *_SHAPES, _LOGITS)),
+        )
+        for word, factor in (("x 2", 2), ("/ 2", 0.5))
+    },
+    "positions hold longer": {"learning_rates.means_last": 0.5},
+    "shapes fall": {"learning_rates.shapes_last": 0.25},
+    "cooldown 0.25": {"cooldown": 0.25},
+    "no relocation": {"strategy.last": 0.0},
+    "relocations x 2": {"strategy.every": 50},
+    "min mass x 4": times(4, "strategy.min_mass", usual=_XRAY),
+    "min mass / 4": times(0.25, "strategy.min_mass", usual=_XRAY),
+    "ramp": {"homogenise": 1.0},
+    "densities solved for": {"solve": 250},
+    "hermite of order 2": {"basis": "hermite", "order": 2},
+}
+VARIANTS: dict[Kind, dict[str, Settings]] = {"photos": _OF_PHOTOS, "xray": _OF_XRAYS}
 
 
 @dataclass(frozen=True)
 class Options:
-    """Compare settings of fits to photographs.
+    """Compare settings of fits to photographs or to projections.
 
     Args:
-        captures: what is fitted, as ``rift fit photos`` takes it; nothing if not given.
+        captures: what is fitted, as ``rift fit`` takes it; nothing if not given.
+        kind: of the captures.
         steps: of each fit.
         splats: of each fit.
         downscale: of the photographs.
         eps2d: variance that the rasterizer adds, in square pixels.
         seeds: of each variant.
-        variants: by name; all if not given.
+        variants: by name; all of the kind if not given.
         out: folder for the scores.
         markdown: file for the tables.
         device: which OpenCL device, as RIFT_DEVICE selects it.
     """
 
     captures: Annotated[tuple[Path, ...], Positional] = ()
+    kind: Kind = "photos"
     steps: int = 500
     splats: int = 8000
     downscale: int = 1
     eps2d: float = 0.1
     seeds: tuple[int, ...] = (0,)
-    variants: tuple[str, ...] = tuple(VARIANTS)
+    variants: tuple[str, ...] = ()
     out: Path = Path("rift-search")
     markdown: Path | None = None
     device: str | None = None
@@ -176,8 +209,9 @@ class Scores:
         seed: its seed.
         size: how large it is.
         psnr: mean of the held-out views, dB.
-        ssim: mean of the held-out views.
+        ssim: mean of the held-out views; None of projections.
         cpu_s: processor seconds of all threads.
+        kind: of the capture.
     """
 
     variant: str
@@ -185,8 +219,9 @@ class Scores:
     seed: int
     size: Size
     psnr: float
-    ssim: float
+    ssim: float | None
     cpu_s: float
+    kind: Kind = "photos"
 
     @classmethod
     def read(cls, path: Path) -> Scores:
@@ -201,64 +236,75 @@ def search(options: Options) -> None:
     options.out.mkdir(parents=True, exist_ok=True)
     for seed in options.seeds:
         for capture in options.captures:
-            for variant in options.variants:
+            for variant in options.variants or VARIANTS[options.kind]:
                 given = f"{size.steps}-{size.splats}-{size.downscale}-{size.eps2d:g}"
-                name = f"{capture.name}-{given}-{variant}-{seed}".replace(" ", "_")
+                name = f"{capture.stem}-{given}-{variant}-{seed}".replace(" ", "_")
                 path = options.out / f"{name.replace('/', 'over')}.json"
                 if not path.is_file():
                     say(name)
-                    found = _fitted(capture, variant, seed, size, options.device)
+                    found = _fitted(options, capture, variant, seed, size)
                     write_text(path, json.dumps(asdict(found), indent=1) + "\n")
 
 
-def _fitted(capture: Path, variant: str, seed: int, size: Size, device: str | None) -> Scores:
+def _fitted(options: Options, capture: Path, variant: str, seed: int, size: Size) -> Scores:
+    kind = options.kind
+    sizes = asdict(size)
+    if kind == "xray":
+        del sizes["downscale"]
     began = time.process_time()
     fitted = rift.fit(
         capture,
-        kind="photos",
+        kind=kind,
         hold_out=8,
         seed=seed,
-        device=device,
-        **asdict(size),
-        **VARIANTS[variant],
+        device=options.device,
+        **sizes,
+        **VARIANTS[kind][variant],
     )
     took = time.process_time() - began
-    scores = fitted.metrics["scores"]["held out"]
-    name = capture.name
-    return Scores(variant, name, seed, size, scores["fit_psnr"], scores["fit_ssim"], took)
+    told = fitted.metrics["scores"]["held out"]
+    name, ssim = capture.stem, told.get("fit_ssim")
+    return Scores(variant, name, seed, size, told["fit_psnr"], ssim, took, kind)
 
 
 def tables(found: Sequence[Scores]) -> Iterator[Table]:
-    """A table for each size, with a row for each variant, and one of what the variants are."""
-    names = [name for name in VARIANTS if any(fit.variant == name for fit in found)]
-    for size in sorted({fit.size for fit in found}, key=lambda size: (size.splats, size.steps)):
-        fits = [fit for fit in found if fit.size == size]
-        captures = sorted({fit.capture for fit in fits})
-        rows = [
-            (name, *(_cell(fits, name, capture) for capture in captures))
-            for name in names
-            if any(fit.variant == name for fit in fits)
-        ]
-        yield Table(size.title, ("variant", *captures), rows, (_NOTE,))
-    rows = [(name, _words(VARIANTS[name])) for name in names]
-    yield Table("What the variants change", ("variant", "in place of the defaults"), rows, texts=2)
+    """A table for each size of each kind, and one of what the variants of each kind are."""
+    for kind, variants in VARIANTS.items():
+        ours = [fit for fit in found if fit.kind == kind]
+        names = [name for name in variants if any(fit.variant == name for fit in ours)]
+        for size in sorted({fit.size for fit in ours}, key=lambda size: (size.splats, size.steps)):
+            fits = [fit for fit in ours if fit.size == size]
+            captures = sorted({fit.capture for fit in fits})
+            rows = [
+                (name, *(_cell(fits, name, capture) for capture in captures))
+                for name in names
+                if any(fit.variant == name for fit in fits)
+            ]
+            note = _NOTE.format(BASES[kind])
+            yield Table(f"{_TITLES[kind]}: {size.title}", ("variant", *captures), rows, (note,))
+        if names:
+            rows = [(name, _words(variants[name])) for name in names]
+            title = f"{_TITLES[kind]}: what the variants change"
+            yield Table(title, ("variant", "in place of the defaults"), rows, texts=2)
 
 
+_TITLES: dict[Kind, str] = {"photos": "Photographs", "xray": "X-rays"}
 _NOTE = (
     "Mean PSNR of held-out views in dB (and half the spread over seeds, if there are several); its "
-    f"gain over {BASE} with the same seeds; processor seconds."
+    "gain over {} with the same seeds; processor seconds."
 )
 
 
 def _cell(fits: Sequence[Scores], variant: str, capture: str) -> str:
+    base = BASES[fits[0].kind]
     ours = {fit.seed: fit for fit in fits if (fit.variant, fit.capture) == (variant, capture)}
-    base = {fit.seed: fit for fit in fits if (fit.variant, fit.capture) == (BASE, capture)}
+    based = {fit.seed: fit for fit in fits if (fit.variant, fit.capture) == (base, capture)}
     if not ours:
         return NONE
     psnr = [fit.psnr for fit in ours.values()]
     spread = f" ± {(max(psnr) - min(psnr)) / 2:.2f}" if len(psnr) > 1 else ""
-    gains = [fit.psnr - base[seed].psnr for seed, fit in ours.items() if seed in base]
-    gain = f" ({mean(gains):+.2f})" if gains and variant != BASE else ""
+    gains = [fit.psnr - based[seed].psnr for seed, fit in ours.items() if seed in based]
+    gain = f" ({mean(gains):+.2f})" if gains and variant != base else ""
     return f"{mean(psnr):.2f}{spread}{gain}, {mean(fit.cpu_s for fit in ours.values()):.0f} s"
 
 
@@ -276,9 +322,10 @@ def page(found: Sequence[Scores], device: rift.Device) -> str:
     """The tables as a page, with the device named."""
     lines = [
         "<!-- Generated by tools/search_defaults.py; do not edit. -->",
-        "# Defaults of `rift fit photos`",
+        "# Defaults of `rift fit`",
         "",
         "    python tools/search_defaults.py CAPTURES --steps 3000 --splats 20000 --out search",
+        "    python tools/search_defaults.py SCANS --kind xray --steps 3000 --out search",
         "    python tools/search_defaults.py --out search --markdown docs/benchmarks/defaults.md",
         "",
         f"{in_words(surroundings(device))} Other programs ran on the same machine: processor "
@@ -290,9 +337,10 @@ def page(found: Sequence[Scores], device: rift.Device) -> str:
 def main() -> int:
     """Search with the command line's arguments; the exit status."""
     options = tyro.cli(Options)
-    unknown = [name for name in options.variants if name not in VARIANTS]
+    known = VARIANTS[options.kind]
+    unknown = [name for name in options.variants if name not in known]
     if unknown:
-        say(f"search_defaults: there is no variant {unknown[0]!r}; there are {', '.join(VARIANTS)}")
+        say(f"search_defaults: there is no variant {unknown[0]!r}; there are {', '.join(known)}")
         return 2
     try:
         search(options)

@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 
 from rift_cl.commands.fit_photos.settings import FitPhotosSettings
+from rift_cl.commands.fit_xray.settings import FitXraySettings
 
 TOOLS = Path(__file__).parents[2] / "tools"
 
@@ -27,14 +28,15 @@ def scores(search):
     return search.Scores("0.1", "lego", 0, size, 30.0, 0.9, 12.0)
 
 
-def test_every_variant_is_taken_and_no_two_are_the_same(search):
-    made = [
-        FitPhotosSettings.of(Path("capture"), Path("out"), **values)
-        for values in search.VARIANTS.values()
-    ]
+@pytest.mark.parametrize(
+    ("kind", "kept"), [("photos", FitPhotosSettings), ("xray", FitXraySettings)]
+)
+def test_every_variant_is_taken_and_no_two_are_the_same(search, kind, kept):
+    variants = search.VARIANTS[kind]
+    made = [kept.of(Path("capture"), Path("out"), **values) for values in variants.values()]
     for number, settings in enumerate(made):
         settings.check()
-        assert settings not in made[:number], [*search.VARIANTS][number]
+        assert settings not in made[:number], [*variants][number]
 
 
 def test_a_factor_is_of_what_was_given_or_of_the_default(search):
@@ -62,10 +64,19 @@ def test_only_fits_of_one_size_compare(search, scores):
     assert "+" not in tables[1].rows[0][1]
 
 
+def test_kinds_are_told_apart(search, scores):
+    xray = replace(scores, kind="xray", variant="min mass x 4", capture="tooth", ssim=None)
+    found = [scores, xray, replace(xray, variant="defaults", psnr=29.0)]
+    photos, _, rays, meant = search.tables(found)
+    assert (photos.title.split(":")[0], rays.title.split(":")[0]) == ("Photographs", "X-rays")
+    assert [row[1] for row in rays.rows] == ["29.00, 12 s", "30.00 (+1.00), 12 s"]
+    assert "--strategy.min-mass 0.08" in meant.rows[1][1]
+
+
 def test_a_search_goes_on_where_it_was(search, scores, tmp_path, monkeypatch):
     fitted = []
 
-    def fit(capture, variant, seed, size, device):
+    def fit(options, capture, variant, seed, size):
         fitted.append((capture.name, variant, seed))
         return replace(scores, capture=capture.name, variant=variant, seed=seed, size=size)
 

@@ -233,6 +233,13 @@ def test_a_long_run_has_no_more_relocations_than_there_may_be(device):
     assert [s for s in range(1, 19) if uneven.relocates_at(s)] == list(range(2, 19, 2))
 
 
+def test_what_counts_as_unneeded_falls_until_the_last_relocation(device):
+    settings = ResidualSettings(min_contribution=0.4, min_contribution_last=0.1, last=0.5)
+    strategy = settings.begin(parameters_of(device), RUN)
+    found = [strategy.min_contribution(step) for step in (0, 250, 500, 999)]
+    assert found == pytest.approx([0.4, 0.25, 0.1, 0.1])
+
+
 def test_what_was_seen_is_kept_and_checked(device):
     parameters = parameters_of(device)
     strategy = ResidualSettings().begin(parameters, RUN)

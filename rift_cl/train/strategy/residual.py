@@ -75,11 +75,12 @@ class ResidualSettings(GrowthSettings):
     views: int = 20
     """Training views before a relocation that say what each splat contributes: those of so many
     steps, or of all since the last relocation where these are fewer."""
-    min_contribution: float = 0.1
+    min_contribution: float = 0.4
     """Contribution up to which a splat is relocated at the start, as a fraction of the median
     contribution: how many pixels it makes up in a view that looks at it."""
-    min_contribution_last: float = 0.1
-    """The same at the last relocation; in between it changes in proportion to the steps."""
+    min_contribution_last: float = 0.0
+    """The same at the last relocation; in between it changes in proportion to the steps. Early
+    on much is in a wrong place, and later on what is faint shows something."""
 
     def __post_init__(self) -> None:
         """Check every number's range."""
