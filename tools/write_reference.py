@@ -118,7 +118,7 @@ def _values(kind: Any) -> str:
         return names.get(kind, "A text" if kind is str else "")
     found = list(dict.fromkeys(filter(None, (_values(part) for part in parts if part is not ...))))
     if get_origin(kind) is tuple and found:
-        return f"{found[0]}, any number of times" if ... in parts else f"{len(parts)} values"
+        return f"{found[0]}, any number of them" if ... in parts else f"{len(parts)} values"
     return " or ".join([*found[:1], *(each[0].lower() + each[1:] for each in found[1:])])
 
 

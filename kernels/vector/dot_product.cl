@@ -1,8 +1,9 @@
 /* Sums of products of two arrays, one for each of a fixed number of work-items.
  *
- *     sums[item] + sums[count + item] = sum over the item's samples of x[i] y[i]
+ *     sums[item] + sums[count + item] = sum over the item's samples of (scale x[i]) (scale y[i])
  *
- * or of x[i] alone unless PRODUCT.
+ * or of scale x[i] alone unless PRODUCT. The scale is a power of two, which changes no digit: 1, but
+ * where products would leave the range of the type.
  *
  * On a CPU an item's samples are a run of LENGTH of them, on a GPU every COUNT-th, so that neighbours
  * read neighbours. Additions are compensated (Neumaier 1974): what rounding loses of each one is
@@ -19,7 +20,7 @@
 #define PRODUCT 1
 #endif
 #define CONTIGUOUS (LANES == 8)
-#define AT(load, p, q) (PRODUCT ? load(p) * load(q) : load(p))
+#define AT(load, p, q) (PRODUCT ? (scale * load(p)) * (scale * load(q)) : scale * load(p))
 #define ONE(p) (*(p))
 
 /* Where the larger operand is exact, the difference is what the addition lost. */
@@ -39,7 +40,7 @@ static real over_lanes(lanes v) {
 
 KERNEL void dot_product(
     __global const real *x, __global const real *y, __global real *sums,
-    ulong size, ulong length, ulong count)
+    ulong size, ulong length, ulong count, real scale)
 {
   const ulong item = get_global_id(0);
   if (item >= count) return;

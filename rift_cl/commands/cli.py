@@ -23,6 +23,7 @@ import tyro
 
 from rift_cl import __version__
 from rift_cl.commands.console_table import print_table
+from rift_cl.commands.options import gathered
 from rift_cl.commands.progress_bar import print_any_text, print_line
 from rift_cl.commands.runner import (
     Output,
@@ -85,6 +86,7 @@ def _run(arguments: Sequence[str]) -> int:
         return 0
     name, rest = _with_capture(*_named(list(arguments)))
     if name in COMMANDS:
+        rest = gathered(rest, COMMANDS[name].settings_class())
         entry = _command(name, _earlier(name, rest), rest)
         return _parsed(name, entry, rest)()
     if first == "fit":

@@ -9,7 +9,7 @@ whose title the help lists them; a field, or a part of the tree, that is marked 
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import Field, dataclass, fields, is_dataclass, replace
 from pathlib import Path
 from typing import (
@@ -20,6 +20,7 @@ from typing import (
     Literal,
     NamedTuple,
     TypeVar,
+    get_args,
     get_type_hints,
 )
 
@@ -200,6 +201,42 @@ def shown_options(settings: type, default: Any = None) -> Iterator[ShownOption]:
     for option in _options_in(settings, default):
         said = option.group is not _UNSAID
         yield option if said else option._replace(group=groups[option.path[0]])
+
+
+def gathered(words: Sequence[str], settings: type) -> list[str]:
+    """A command line in which every list is given once: ``--test A --test B`` is ``--test A B``.
+
+    Argument parsers keep the last of them alone, and say nothing of the others.
+
+    Args:
+        words: of the command line.
+        settings: the class of the command's settings.
+    """
+    starts = [index for index, word in enumerate(words) if word.startswith("--")]
+    names = [_plain_name(words[start]) for start in starts]
+    repeated = {name for name in names if names.count(name) > 1}
+    lists = {option.name for option in shown_options(settings) if _is_list(option.kind)} & repeated
+    if not lists:
+        return list(words)
+    values: dict[str, list[str]] = {name: [] for name in lists}
+    others = list(words[: starts[0]])
+    for name, start, end in zip(names, starts, [*starts[1:], len(words)], strict=True):
+        if name not in lists:
+            others += words[start:end]
+            continue
+        _, given, value = words[start].partition("=")
+        values[name] += [value] if given else []
+        values[name] += words[start + 1 : end]
+    return others + [word for name in sorted(lists) for word in (f"--{name}", *values[name])]
+
+
+def _plain_name(word: str) -> str:
+    return word.removeprefix("--").partition("=")[0].replace("-", "_")
+
+
+def _is_list(kind: Any) -> bool:
+    """Whether an option takes any number of values."""
+    return Ellipsis in get_args(kind) or any(_is_list(part) for part in get_args(kind))
 
 
 def _first_paragraph(described: type) -> str:

@@ -49,6 +49,22 @@ def test_what_is_not_finite_shows(device, value):
     assert not np.isfinite(total(device, device.array(x)))
 
 
+@pytest.mark.parametrize("power", [-110, -60, 60, 100])
+def test_products_beyond_float32_are_summed_as_well_as_others(device, power):
+    x, y = RANDOM.standard_normal((2, 54_321)).astype(np.float32)
+    scaled = [device.array(np.ldexp(values, power)) for values in (x, y)]
+    found = dot(device, *scaled)
+    assert found == pytest.approx(
+        np.ldexp(dot(device, device.array(x), device.array(y)), 2 * power)
+    )
+
+
+def test_what_cancels_is_not_taken_for_faint(device):
+    x = np.full(10_000, 1e15, np.float32)
+    y = np.where(np.arange(x.size) % 2, 1, -1).astype(np.float32)
+    assert dot(device, device.array(x), device.array(y)) == 0
+
+
 @pytest.mark.parametrize("size", SIZES)
 def test_copies_products_and_clipping(device, size):
     w, y = RANDOM.standard_normal((2, size)).astype(np.float32)

@@ -8,7 +8,7 @@ import pytest
 import tyro
 
 from rift_cl.commands.cli import COMMANDS, main
-from rift_cl.commands.options import option_groups, shown_options
+from rift_cl.commands.options import gathered, option_groups, shown_options
 from rift_cl.commands.runner import command
 
 # What the command line and one class of settings need: far below what any job loads.
@@ -150,6 +150,14 @@ def test_what_few_fits_need_is_listed_for_experts(job):
     expert = ("learning_rates.", "strategy.", "solve.", "homogenisation.", "basis.")
     dotted = {name for names in groups.values() for name in names if name.startswith(expert)}
     assert len(dotted) > 15 and dotted <= groups["expert"]
+
+
+def test_a_list_that_is_given_twice_is_one_list():
+    settings = COMMANDS["plan"].settings_class()
+    twice = ["--views", "3", "--camera", "a", "b", "--seed", "-1", "--camera=c", "--views", "4"]
+    once = ["--views", "3", "--seed", "-1", "--views", "4", "--camera", "a", "b", "c"]
+    assert gathered(twice, settings) == once
+    assert gathered(once, settings) == once
 
 
 def test_a_switch_that_is_on_is_turned_off_by_its_negative():

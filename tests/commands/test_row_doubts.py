@@ -74,7 +74,10 @@ def _saturated(lines):
 
 
 WRONG = {
-    "no beam": (_dark_views, "20 of 120 views have next to no beam .views 70, 71, 72, 73, 74, 75, ..."),
+    "no beam": (
+        _dark_views,
+        "20 of 120 views have next to no beam .views 70, 71, 72, 73",
+    ),
     "flats between": (_open_views, "3 of 120 views show next to nothing .* .views 5, 45, 85"),
     "starved": (lambda lines: frames(6 * lines, BEAM), "of row 1 have no signal above"),
     "dark flats": (_dark_flats, "the flats read .* above the darks: some of them"),

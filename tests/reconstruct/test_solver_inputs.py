@@ -171,7 +171,24 @@ def test_what_only_some_methods_take(device):
 def test_data_beyond_the_range_of_their_type_say_so(device):
     A, _, _, y = problem(device)
     with pytest.raises(NonFiniteError, match="scale"):
-        cgls(A, y * np.float32(1e25))
+        cgls(A, y * np.float32(1e36))
+
+
+@pytest.mark.parametrize("power", [-70, -40, 50, 80])
+def test_no_unit_of_data_weights_or_lengths_changes_the_image(device, power):
+    A, _, _, y = problem(device)
+    factor = float(np.ldexp(1.0, power))
+    weights = np.exp(-y / y.max())
+    plain, weighted = cgls(A, y, 4), cgls(A, y, 4, weights=weights)
+    assert cgls(A, np.ldexp(y, power), 4) / factor == pytest.approx(plain, rel=1e-4, abs=1e-6)
+    if power < 80:
+        heavier = cgls(A, y, 4, weights=np.ldexp(weights, power))
+        assert heavier == pytest.approx(weighted, rel=1e-4, abs=1e-6)
+    length = float(np.ldexp(1.0, power // 2))
+    grid = Grid(GRID.shape, tuple(np.multiply(GRID.spacing, length)))
+    scan = Parallel(SCAN.angles, SCAN.bins, SCAN.pitch * length)
+    longer = cgls(Projector(grid, scan, device=device), y, 4)
+    assert longer * length == pytest.approx(plain, rel=1e-4, abs=1e-6)
 
 
 @every_method

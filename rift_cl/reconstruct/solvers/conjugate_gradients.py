@@ -20,15 +20,13 @@ from rift_cl.cl.arithmetic import axpby
 from rift_cl.cl.elementwise import copy, multiply
 from rift_cl.cl.host_arrays import as_real_array
 from rift_cl.cl.reductions import dot
-from rift_cl.errors import InputError, ShapeError
+from rift_cl.errors import InputError, NonFiniteError, ShapeError
 from rift_cl.geometry.numbers import one_number
 from rift_cl.operators.linear import LinearOperator
 from rift_cl.reconstruct.solvers.data_term import DataTerm
 from rift_cl.reconstruct.solvers.residual_weight import Precondition
 from rift_cl.reconstruct.solvers.solver import Solver, SolverState, solve
 
-# Squares below this have lost digits, or all of them, in float32.
-_FAINTEST = 1e-30
 # A step that raises what is minimized by more than so many units of rounding goes along rounding,
 # and the next ones would go astray ever faster: the run ends before it. So it does before a step
 # that would lower it by less than the square of that unit.
@@ -91,11 +89,7 @@ class Cgls(Solver):
         gradient = data.image()
         self._spare = data.data(), data.data(), gradient, data.image() if scaled else gradient
         self._turn()
-        if 0 < self._now.slope < _FAINTEST:
-            raise InputError(
-                f"y and A are so small that squares do not fit {data.dtype}: scale lengths and "
-                "values to near 1"
-            )
+        self._check(self._now.slope)
 
     @property
     def loss(self) -> float:
@@ -110,6 +104,7 @@ class Cgls(Solver):
         data.A(now.direction, out=seen)
         data.weigh(seen, weighted)
         curvature = dot(device, seen, weighted) + self._pull(now.direction)
+        self._check(curvature, now.slope)
         unit = float(np.finfo(data.dtype).eps)
         if not (now.slope > 0 and curvature > 0 and now.slope**2 > unit**2 * now.loss * curvature):
             self._exhausted = True
@@ -124,6 +119,13 @@ class Cgls(Solver):
             return
         now.rms, now.loss = rms, loss
         now.step += 1
+
+    def _check(self, *values: float) -> None:
+        """Refuse to go on with numbers that the type does not hold."""
+        if not np.isfinite(values).all():
+            raise NonFiniteError(
+                f"A' A y is beyond {self.data.dtype}: scale lengths, values and weights to near 1"
+            )
 
     def _turn(self) -> None:
         """Make the direction that of the next step: conjugate to those before."""
@@ -207,6 +209,7 @@ def cgls(
 
     Raises:
         InputError: an argument does not fit, is out of its range, or holds NaN or infinity.
+        NonFiniteError: lengths, values or weights are so large that numbers do not fit the type.
     """
     solver = Cgls(
         A,
