@@ -47,11 +47,11 @@ VARIANTS: dict[str, Settings] = {
     "mcmc": {"strategy": "mcmc"},
     "defaults": {},
     "opacities penalised": {"strategy.opacity_penalty": 0.01},
-    "flatness": {"surface.flatness": 0.1},
+    "flatness": {"surface.flatness": 0.5},
     "opacity entropy": {"surface.opacity_entropy": 0.01},
     "normal consistency, flatness": {
         "surface.normal_consistency": 0.01,
-        "surface.flatness": 0.03,
+        "surface.flatness": 0.15,
     },
     "more normal consistency": {"surface.normal_consistency": 0.1},
     "preset surface": PRESETS["surface"],

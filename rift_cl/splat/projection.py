@@ -356,9 +356,9 @@ def _check(device: Device, splats: Splats, camera: Camera, settings: SplatSettin
             "xray mode wants a camera without aperture: X-rays pass no lens, so that line "
             "integrals are sharp at every depth"
         )
-    if camera.model == "pinhole" and settings.near <= 0:
+    if camera.model == "pinhole" and settings.near_plane <= 0:
         raise SettingError(
-            settings, "near", f"is {settings.near}, a pinhole camera wants a positive distance"
+            settings, "near", f"is {settings.near_plane}, a pinhole camera wants a positive distance"
         )
 
 
@@ -382,7 +382,7 @@ def _arguments(projection: Projection) -> dict[str, Any]:
         "width": camera.width,
         "height": camera.height,
         "aperture": None if camera.aperture is None else _of_aperture(camera.aperture),
-        "near_plane": settings.near,
+        "near_plane": settings.near_plane,
         "far_plane": settings.far,
         "eps2d": settings.eps2d,
         "MODEL": _MODELS[camera.model],

@@ -16,6 +16,8 @@ Activation = Literal["clamp", "exp", "square"]
 # Edges of tiles where none is given: large ones share what is read of a splat among more pixels,
 # but a small image cut into few of them keeps few cores busy.
 LARGE_TILE, SMALL_TILE, _ENOUGH = 32, 16, 64
+# The near plane where nothing is known of the scene, in its units, and as a share of its size.
+_NEAR, _NEAR_SHARE = 0.01, 0.002
 # Devices count in float32.
 _LARGEST = 3.4028234e38
 
@@ -28,8 +30,9 @@ class SplatSettings:
         InputError: a number is out of its range, or a choice is unknown.
     """
 
-    near: Expert[float] = 0.01
-    """Depth below which splats are left out, in scene units; above 0 for a pinhole."""
+    near: AutoExpert[float] = None
+    """Depth below which splats are left out, in scene units; above 0 for a pinhole. Default: of a
+    fit, 1/500 of the size of the scene; otherwise 0.01."""
     far: Expert[float] = 1e10
     """Depth above which splats are left out, in scene units."""
     radius_clip: Expert[float] = 0.0
@@ -63,19 +66,23 @@ class SplatSettings:
 
     def __post_init__(self) -> None:
         """Check every number's range."""
-        if not one_number(self.near) < one_number(self.far):
+        if not one_number(self.near_plane) < one_number(self.far):
             raise SettingError(
                 self,
                 "near",
-                f"is {self.near!r} and far is {self.far!r}, wanted near < far, both finite",
+                f"is {self.near_plane!r} and far is {self.far!r}, wanted near < far, both finite",
             )
         for name in ("radius_clip", "eps2d"):
             value = getattr(self, name)
             if not one_number(value) >= 0:
                 raise SettingError(self, name, f"is {value!r}, wanted a number >= 0")
-        for name in ("near", "far", "radius_clip", "eps2d"):
+        for name in ("near_plane", "far", "radius_clip", "eps2d"):
             if abs(one_number(getattr(self, name))) > _LARGEST:
-                raise SettingError(self, name, f"is {getattr(self, name)!r}, too large for float32")
+                raise SettingError(
+                    self,
+                    name.removesuffix("_plane"),
+                    f"is {getattr(self, name)!r}, too large for float32",
+                )
         edge = one_number(SMALL_TILE if self.tile is None else self.tile)
         if not (edge >= 1 and edge.is_integer()):
             raise SettingError(self, "tile", f"is {self.tile!r}, wanted a whole number >= 1")
@@ -104,6 +111,15 @@ class SplatSettings:
                 f"{self.activation} has no meaning in xray mode, which adds densities as they are: "
                 "leave it at clamp",
             )
+
+    @property
+    def near_plane(self) -> float:
+        """The depth below which splats are left out."""
+        return _NEAR if self.near is None else self.near
+
+    def for_scene(self, size: float) -> SplatSettings:
+        """These settings with ``near`` chosen, for a scene of a size in its own units."""
+        return self if self.near is not None else replace(self, near=_NEAR_SHARE * size)
 
     def for_image(self, size: tuple[int, int], *, cpu: bool) -> SplatSettings:
         """These settings with the tile's edge chosen, for an image on a kind of device.

@@ -30,8 +30,8 @@ class SurfaceSettings:
     """
 
     flatness: float = 0.0
-    """Weight of the mean of splats' smallest scales in the loss, with scales in units of the scene:
-    splats become flat (PGSR, Chen et al. 2024)."""
+    """Weight of the mean of splats' smallest scales in the loss, with scales as shares of the size
+    of the scene: splats become flat (PGSR, Chen et al. 2024)."""
     opacity_entropy: float = 0.0
     """Weight of the mean binary entropy of opacities in the loss, in nats: opacities go to 0 or 1
     (SuGaR, Guedon and Lepetit 2024)."""

@@ -39,7 +39,7 @@ from rift_cl.train.per_view.octaves import Octaves
 from rift_cl.train.per_view.poses import Poses
 from rift_cl.train.schedules import CoefficientSchedule, LearningRateSchedule
 from rift_cl.train.settings import TrainSettings
-from rift_cl.train.start.points import scene_extent
+from rift_cl.train.start.points import scene_extent, scene_size
 from rift_cl.train.state_schema import check_state
 from rift_cl.train.strategy import Strategy, TrainingRun
 from rift_cl.train.surface_settings import SurfacePenalties
@@ -123,9 +123,15 @@ class Trainer:
         check_own_loss(self.device, settings.loss)
         self.schedule = LearningRateSchedule(settings, scene_extent(pictures.cameras))
         extent, views = self.schedule.extent, len(pictures.cameras)
+        self.size = scene_size(pictures.cameras)
         self._mean_pixels = sum(math.prod(camera.size) for camera in pictures.cameras) / views
         run = TrainingRun(
-            settings.steps, settings.splats, settings.seed, extent, self.schedule.cooldown
+            settings.steps,
+            settings.splats,
+            settings.seed,
+            extent,
+            self.schedule.cooldown,
+            size=self.size,
         )
         self.strategy = settings.strategy.begin(parameters, run)
         if not isinstance(self.strategy, Strategy) or not hasattr(self.strategy, "run"):
@@ -135,6 +141,8 @@ class Trainer:
                 "calls super().__init__(run)"
             )
         rendering = self.strategy.render_settings(rendering or SplatSettings())
+        if all(camera.model != "ortho" for camera in pictures.cameras):
+            rendering = rendering.for_scene(self.size)
         self.renderer = Renderer(rendering, device=self.device)
         self.coefficient_schedule = CoefficientSchedule(settings, pictures.cameras, flat=flat)
         self._add_coefficients()
@@ -286,7 +294,8 @@ class Trainer:
     def _surface_penalties(self, step: int) -> SurfacePenalties:
         if step >= self.schedule.cooldown:
             return SurfacePenalties()
-        return self.settings.surface.at(step / self.settings.steps)
+        found = self.settings.surface.at(step / self.settings.steps)
+        return found._replace(flatness=found.flatness / self.size)
 
     def _work(self, step: int, splats: int, steps: int = 1, level: int = 0) -> float:
         """Cost of steps, in units of one step with all splats of one color each.
@@ -424,7 +433,7 @@ class Trainer:
 
     def _limit_band(self) -> None:
         if self._band is not None:
-            self._band.limit(self.parameters, near=self.renderer.settings.near)
+            self._band.limit(self.parameters, near=self.renderer.settings.near_plane)
 
     def view_at(self, step: int) -> int:
         """The view of a step: all of them once, then all again in another random order."""

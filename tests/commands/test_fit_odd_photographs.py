@@ -7,8 +7,11 @@ import json
 import numpy as np
 import pytest
 
+import rift_cl as rift
 from rift_cl.commands.cli import main
-from rift_cl.commands.fit_photos.scores import ViewScore, brightness_spread
+from rift_cl.commands.fit_photos.pictures import CapturePictures
+from rift_cl.commands.fit_photos.scores import ViewScore, brightness_of
+from rift_cl.io.captures.capture import open_capture
 from rift_cl.io.images.image import read_image, write_png
 
 
@@ -50,15 +53,71 @@ def test_photographs_of_nothing_are_told(capture, tmp_path, capsys):
     assert (tmp_path / "fit" / "scene.ply").is_file()
 
 
+def test_alpha_that_is_the_same_everywhere_cuts_out_nothing(capture, tmp_path, capsys):
+    """Many programs write RGBA: the fit is that of the colours alone, to the bit."""
+
+    def with_alpha(level):
+        def change(_, image):
+            return np.dstack([image, np.full(image.shape[:2], level, np.float32)])
+
+        return change
+
+    scenes = {}
+    for name, change in {
+        "plain": lambda _, image: image,
+        "opaque": with_alpha(1),
+        "nearly": with_alpha(254 / 255),
+    }.items():
+        made = changed(capture, tmp_path / name, change)
+        told(made, tmp_path / f"fit {name}", capsys, "--steps", 10)
+        scenes[name] = (tmp_path / f"fit {name}" / "scene.ply").read_bytes()
+    assert scenes["plain"] == scenes["opaque"] == scenes["nearly"]
+
+
+def test_a_photograph_that_the_object_fills_belongs_to_what_is_cut_out(capture, tmp_path, capsys):
+    def change(number, image):
+        alpha = np.ones(image.shape[:2], np.float32)
+        if number:
+            alpha[:20] = 0
+        return np.dstack([image, alpha])
+
+    cut = changed(capture, tmp_path / "cut", change)
+    pictures = CapturePictures(rift.default_device(), open_capture(cut).views)
+    assert pictures.any_cut_out()
+    assert pictures.foreground(0).all()
+    assert pictures.foreground(1).mean() == pytest.approx(2 / 3)
+
+
+def test_a_fit_that_is_no_better_than_its_neighbours_is_told(capture, tmp_path, capsys):
+    shuffled = tmp_path / "shuffled"
+    shuffled.mkdir()
+    record = json.loads((capture / "transforms.json").read_text())
+    names = [frame["file_path"] for frame in record["frames"]]
+    for frame, name in zip(record["frames"], names[3:] + names[:3], strict=True):
+        (shuffled / name).write_bytes((capture / name).read_bytes())
+        frame["file_path"] = name
+    (shuffled / "transforms.json").write_text(json.dumps(record))
+    assert "poses, intrinsics or masks" in told(shuffled, tmp_path / "fit", capsys, "--steps", 5)
+    assert "poses, intrinsics or masks" in (tmp_path / "fit" / "report.html").read_text()
+    assert "poses, intrinsics" not in told(capture, tmp_path / "right", capsys, "--steps", 400, "--splats", 600)
+
+
 def test_brightness_is_a_factor_of_each_picture():
     random = np.random.default_rng(0)
     images = random.uniform(0.1, 1, (3, 4, 5, 3)).astype(np.float32)
 
-    def spread(factors):
-        return brightness_spread(
-            [ViewScore("", 0.0, {}, f * i, i) for f, i in zip(factors, images, strict=True)]
+    def brightness(factors, noise=0.0):
+        return brightness_of(
+            [
+                ViewScore("", 0.0, {}, f * i + noise * random.normal(size=i.shape), i)
+                for f, i in zip(factors, images, strict=True)
+            ]
         )
 
-    assert spread([0.7, 0.7, 0.7]) == pytest.approx(0, abs=1e-6)
-    assert spread([0.5, 1, 2]) == pytest.approx(np.std(np.log([0.5, 1, 2])), rel=1e-5)
-    assert brightness_spread([]) == 0
+    assert brightness([0.7, 0.7, 0.7]).spread == pytest.approx(0, abs=1e-6)
+    found = brightness([0.5, 1, 2])
+    assert found.spread == pytest.approx(np.std(np.log([0.5, 1, 2])), rel=1e-5)
+    assert found.explained == pytest.approx(1)
+    # What is wrong in other ways is no matter of brightness.
+    assert brightness([0.9, 1, 1.1], 0.5).explained < 0.2
+    assert brightness_of([]) == (0, 0)

@@ -180,7 +180,7 @@ def test_the_walk_in_torch_is_as_wide_as_ours(tool, case):
     torch = pytest.importorskip("torch", reason="torch is not installed")
     faint = {**case.raw, "logits": np.full(case.count, -7.0, np.float32)}
     walk = replace(case.settings, strategy=McmcSettings(first=30_000, noise=1.0))
-    theirs = tool("bench.torch_trainer").TorchTrainer(faint, walk, extent=1.0)
+    theirs = tool("bench.torch_trainer").TorchTrainer(faint, walk, extent=1.0, size=1.0)
     before = theirs._leaves["means"].detach().clone()
     theirs._shake(1.0)
     moved = (theirs._leaves["means"].detach() - before).numpy()

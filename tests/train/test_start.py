@@ -12,6 +12,7 @@ from rift_cl.train.start.points import (
     focus_of,
     random_points,
     scene_extent,
+    scene_size,
     start_splats,
 )
 
@@ -73,17 +74,70 @@ def test_far_points_lie_behind_the_focus_of_a_camera_that_sees_them():
     assert far_points(cameras, 0, 3).shape == (0, 3)
 
 
-def test_cameras_that_look_apart_are_told():
-    away = [Camera((4, 4), [[400, 0, 2], [0, 400, 2], [0, 0, 1]], pose) for pose in poses_apart()]
-    with pytest.raises(InputError, match="in common"):
-        random_points(away, 10, 0)
+def turned(cameras, turn):
+    """The same places, with axes turned."""
+    return [Camera(c.size, c.K, np.diag([*turn, 1.0]) @ c.view) for c in cameras]
 
 
-def poses_apart():
-    for shift in (0, 1e3, 2e3, 3e3, 4e3):
+def moved(cameras, scale):
+    """The same cameras in another unit of length."""
+    views = []
+    for camera in cameras:
+        view = camera.view.copy()
+        view[:3, 3] *= scale
+        views.append(Camera(camera.size, camera.K, view))
+    return views
+
+
+def test_cameras_that_look_away_are_told():
+    with pytest.raises(InputError, match="OpenCV's for OpenGL's"):
+        random_points(turned(ring(), (1, -1, -1)), 10, 0)
+
+
+def test_cameras_whose_pictures_share_nothing_are_told():
+    narrow = [Camera(c.size, [[9000, 0, 40], [0, 9000, 30], [0, 0, 1]], c.view) for c in ring(5)]
+    random = np.random.default_rng(0)
+    astray = []
+    for camera in narrow:
+        view = camera.view.copy()
+        view[:3, 3] += random.uniform(-2, 2, 3) * (1, 1, 0)
+        astray.append(Camera(camera.size, camera.K, view))
+    with pytest.raises(InputError, match="no volume that half of the cameras see"):
+        random_points(astray, 10, 0)
+
+
+def survey(count=30, tilt=0.0):
+    """Cameras in a line, that look down side by side, and each next one shows 3/4 of the last."""
+    random, cameras = np.random.default_rng(5), []
+    for number in range(count):
+        a, b = tilt * random.standard_normal(2)
+        turn = np.linalg.qr(np.array([[1, 0, a], [0, 1, b], [-a, -b, 1]]))[0]
         view = np.eye(4)
-        view[0, 3] = -shift
-        yield view
+        view[:3, :3] = turn * np.sign(np.diag(turn))
+        view[:3, 3] = -view[:3, :3] @ [0.667 * number, 0, 0]
+        cameras.append(Camera((60, 80), [[90, 0, 40], [0, 90, 30], [0, 0, 1]], view))
+    return cameras
+
+
+@pytest.mark.parametrize("tilt", [0.0, 0.003])
+def test_cameras_side_by_side_see_what_they_overlap_in(tilt):
+    cameras = survey(tilt=tilt)
+    depth = focus_of(cameras)[2]
+    assert depth == pytest.approx(4, rel=0.05)
+    points = random_points(cameras, 300, 0)
+    assert points[:, 2].min() > 1 and points[:, 2].max() < 9
+    assert np.ptp(points[:, 0]) > 0.8 * 0.667 * 30
+    # In any unit.
+    for scale in (20.0, 0.05):
+        assert random_points(moved(cameras, scale), 300, 0) == pytest.approx(scale * points)
+    # Few of them have something in common.
+    assert random_points(survey(4, tilt), 100, 0)[:, 2].min() > 0
+
+
+def test_the_size_of_a_scene_has_the_unit_of_its_coordinates():
+    for cameras in (ring(), survey(), turned(ring(), (1, -1, -1))):
+        assert scene_size(moved(cameras, 8.0)) == pytest.approx(8 * scene_size(cameras))
+    assert scene_size(ring()) == pytest.approx(1.1 * 5.0)
 
 
 def test_splats_are_as_large_as_the_gaps():

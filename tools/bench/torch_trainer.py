@@ -31,7 +31,8 @@ class TorchTrainer:
     Args:
         raw: first splats before their activations, as ``Parameters.of`` takes them.
         settings: of the run, with the MCMC strategy; splats are not relocated.
-        extent: of the scene.
+        extent: of the scene, for learning rates.
+        size: of the scene, for scales.
         threads: of torch; as many as it takes if None.
     """
 
@@ -41,10 +42,11 @@ class TorchTrainer:
         settings: TrainSettings,
         *,
         extent: float,
+        size: float,
         threads: int | None = None,
     ) -> None:
         self._settings, self._schedule = settings, LearningRateSchedule(settings, extent)
-        self._threads, self._step = threads, 0
+        self._size, self._threads, self._step = size, threads, 0
         assert isinstance(settings.strategy, McmcSettings)
         self._strategy = settings.strategy
         arrays = {name: torch.tensor(array) for name, array in raw.items()}
@@ -93,7 +95,7 @@ class TorchTrainer:
             return torch.zeros(())
         opacity, scale = drawn["opacities"].mean(), drawn["scales"].mean()
         strategy = self._strategy
-        return strategy.opacity_penalty * opacity + strategy.scale_penalty * scale
+        return strategy.opacity_penalty * opacity + strategy.scale_penalty / self._size * scale
 
     @torch.no_grad()
     def _shake(self, amount: float) -> None:

@@ -96,6 +96,7 @@ class TorchTiles(TrainerContender):
         self._trainer = import_module("bench.torch_trainer").TorchTrainer(
             *(case.raw, case.settings),
             extent=self._ours.schedule.extent,
+            size=self._ours.size,
             threads=self.threads,
         )
         pictures = case.pictures

@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rift_cl.commands.cameras.focus import axes_meet
 from rift_cl.errors import InputError
 from rift_cl.geometry import Camera
+from rift_cl.train.start.points import axes_meet
 
 Floats = NDArray[np.float64]
 

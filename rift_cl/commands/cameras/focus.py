@@ -9,12 +9,10 @@ from numpy.typing import NDArray
 
 from rift_cl.commands.pictures.evenly_spaced import evenly
 from rift_cl.geometry import Camera
-from rift_cl.train.start.points import focus_of
+from rift_cl.train.start.points import axes_meet, focus_of
 
 Floats = NDArray[np.float64]
 
-# Root mean square angle by which axes miss a point, as a share of the spread of directions.
-_MISSED = 0.6
 # Cameras and points that are looked at.
 _CAMERAS, _POINTS = 64, 20_000
 # What is nearer, or farther off, than these shares of the points that a camera sees is not among
@@ -46,21 +44,6 @@ def focus_among(cameras: Sequence[Camera], points: NDArray[np.float32] | None) -
     near, middle, far = spans.T
     among = np.mean((depths >= near) & (depths <= far))
     return focus if among >= 0.5 else _ahead(few, middle)
-
-
-def axes_meet(cameras: Sequence[Camera], focus: Floats) -> bool:
-    """Whether the axes of cameras meet near a point, in front of them.
-
-    They do if their axes turn with the directions in which they see it: if they miss it by angles
-    that are small beside the spread of those directions.
-    """
-    ways = focus - np.array([camera.center for camera in cameras])
-    ways /= np.maximum(np.linalg.norm(ways, axis=1, keepdims=True), 1e-300)
-    axes = np.array([camera.view[2, :3] for camera in cameras])
-    mean = ways.mean(axis=0) / (np.linalg.norm(ways.mean(axis=0)) or 1.0)
-    # One less the cosine is half the square of a small angle.
-    missed, spread = np.mean(1 - (ways * axes).sum(axis=1)), np.mean(1 - ways @ mean)
-    return bool(missed < _MISSED**2 * spread)
 
 
 def _depths_seen(cameras: Sequence[Camera], points: NDArray[np.float32] | None) -> Floats | None:

@@ -15,8 +15,10 @@ from rift_cl.commands.fit.run import FitRun
 from rift_cl.commands.fit_photos.bare_input import BareInput
 from rift_cl.commands.fit_photos.photograph_size import fitting_downscale, size_words
 from rift_cl.commands.fit_photos.pictures import CapturePictures
+from rift_cl.commands.fit_photos.pose_check import check_poses
 from rift_cl.commands.fit_photos.report import (
     brightness_notes,
+    doubt_notes,
     fit_page,
     history_notes,
     octave_notes,
@@ -25,7 +27,7 @@ from rift_cl.commands.fit_photos.report import (
 from rift_cl.commands.fit_photos.scores import error_record, score_record, score_views
 from rift_cl.commands.fit_photos.settings import FitPhotosSettings
 from rift_cl.commands.fit_photos.start import first_splats
-from rift_cl.commands.fit_photos.view_split import open_seen, split_views
+from rift_cl.commands.fit_photos.view_split import FEWEST_VIEWS, open_seen, split_views
 from rift_cl.commands.pictures.evenly_spaced import evenly
 from rift_cl.errors import InputError
 from rift_cl.io.captures.capture import (
@@ -182,6 +184,7 @@ class Fit(FitRun[FitPhotosSettings]):
         self.settled = dataclasses.replace(
             settings.decided(len(self.training_views)),
             training=trainer.settings,
+            rendering=dataclasses.replace(settings.rendering, near=trainer.renderer.settings.near),
             downscale=self.downscale,
             first_splats=settings.first_share,
         )
@@ -221,11 +224,12 @@ class Fit(FitRun[FitPhotosSettings]):
             **error_record(self.scores),
         }
         ramp = ramp_notes(settings, len(self.training_views))
-        brightness = brightness_notes(settings, self.scores.get("held out", []))
-        for note in brightness:
+        held_out = self.scores.get("held out", [])
+        doubts = [*brightness_notes(settings, held_out), *doubt_notes(held_out)]
+        for note in doubts:
             self.announce(f"rift: {note}")
         octaves = octave_notes(self.metrics)
-        notes = [*self._notes(), *octaves, *ramp, *history_notes(self._history), *brightness]
+        notes = [*self._notes(), *octaves, *ramp, *history_notes(self._history), *doubts]
         scene = leave_page(settings.out, pictures, self.announce)
         name = capture_name(settings.capture)
         page = fit_page(name, self.scores, self.losses, self.metrics, notes, scene)
@@ -259,16 +263,22 @@ class Fit(FitRun[FitPhotosSettings]):
 
     def _split(self, capture: Capture) -> None:
         settings = self.settings
-        check_places([view.camera for view in capture.views], settings.capture)
-        self.training_views, self.test_views = split_views(
-            capture.views, settings.hold_out, settings.views
-        )
+        cameras = [view.camera for view in capture.views]
+        check_places(cameras, settings.capture)
+        check_poses(cameras, capture.points, settings.capture)
+        hold_out = settings.hold_out if len(cameras) > FEWEST_VIEWS else 0
+        self.training_views, self.test_views = split_views(capture.views, hold_out, settings.views)
         decided = self.checkpoints.decided.get("downscale")
         self.downscale = decided or fitting_downscale(self.training_views, self.device)
 
     def _notes(self) -> list[str]:
         """What was decided about the photographs, and what of them is not used."""
         notes = list(self.source.notes) if isinstance(self.source, BareInput) else []
+        if self.settings.hold_out and not self.test_views:
+            notes.append(
+                f"None of the {len(self.training_views)} photographs was held out: of so few, each "
+                "is needed"
+            )
         masks = sum(view.mask is not None for view in self.training_views)
         if masks:
             notes.append(

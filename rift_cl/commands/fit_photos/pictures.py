@@ -2,16 +2,18 @@
 
 Photographs are kept on the host, in display light as codes of 8 or 16 bits, and are decoded again
 whenever they do not fit the budget, the next step's in another thread while a step works; what a
-step sees is the same either way. Those that have alpha
-of their own show what was cut out: they are laid over a background that is drawn by chance for each
-step, so that transparent places must become transparent. Where a mask is black, or the photograph
-did not reach once its lens was undone, nothing is known: such pixels do not count.
+step sees is the same either way. Those that have alpha of their own show what was cut out: they are
+laid over a background that is drawn by chance for each step, so that transparent places must become
+transparent. Alpha that is the same everywhere, as many programs write it, cuts out nothing. Where a
+mask is black, or the photograph did not reach once its lens was undone, nothing is known: such
+pixels do not count.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
+from dataclasses import replace
 from typing import Any, Literal
 
 import numpy as np
@@ -109,7 +111,9 @@ class CapturePictures:
 
     def _read(self, number: int) -> Kept:
         """A photograph as it is kept; by any thread."""
-        image = read_view(self.views[number], downscale=self._downscale, light=self.light)
+        image = _without_constant_alpha(
+            read_view(self.views[number], downscale=self._downscale, light=self.light)
+        )
         return _codes_of(image) if self.light == "display" else image
 
     def announce(self, view_at: Callable[[int], int]) -> None:
@@ -142,10 +146,22 @@ class CapturePictures:
         return any(self._is_cut_out(number) for number in range(len(self.views)))
 
     def _is_cut_out(self, number: int) -> bool:
-        """Whether a photograph has alpha of its own."""
+        """Whether a photograph has alpha of its own, and this is not the same everywhere."""
         if number not in self._own_alpha:
-            self._own_alpha[number] = read_picture_header(self.views[number].image).alpha
+            view = self.views[number]
+            own = read_picture_header(view.image).alpha
+            if own and view.mask is None and view.lens is None:
+                own = self.image(number).shape[2] == 4
+            elif own:
+                bare = replace(view, mask=None, lens=None)
+                own = _without_constant_alpha(read_view(bare)).shape[2] == 4
+            self._own_alpha[number] = own
         return self._own_alpha[number]
+
+    def _fills(self, number: int) -> bool:
+        """Whether what is cut out of other photographs fills this one."""
+        opaque = read_picture_header(self.views[number].image).alpha
+        return opaque and any(self._is_cut_out(other) for other in evenly(len(self.views), 8))
 
     def _shares(self, number: int) -> Floats | None:
         """(height, width) how much of each pixel is known; None where all is."""
@@ -195,6 +211,8 @@ class CapturePictures:
         image, counted = self.image(number), self.counted(number)
         if image.shape[2] == 4 and counted is None:
             return np.asarray(image[..., 3] > _FOREGROUND)
+        if counted is None and self._fills(number):
+            return np.ones(image.shape[:2], bool)
         if not self.backed:
             return None
         front = np.abs(image[..., :3] - self.behind).max(axis=2) > _FOREGROUND
@@ -220,6 +238,14 @@ class CapturePictures:
         middle = np.median(border, axis=0)
         same = np.abs(border - middle).max(axis=1) <= _CODES / 255
         return np.asarray(middle, np.float32) if same.mean() >= _UNIFORM else None
+
+
+def _without_constant_alpha(image: Floats) -> Floats:
+    """The colours alone where alpha is one number above 0 everywhere, and so tells nothing."""
+    if image.shape[2] == 3:
+        return image
+    alpha = image[..., 3]
+    return image[..., :3] if 0 < alpha.min() == alpha.max() else image
 
 
 def _codes_of(image: Floats) -> Kept:

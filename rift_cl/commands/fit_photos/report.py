@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from rift_cl.commands.fit_photos.error_places_report import show_error_places
-from rift_cl.commands.fit_photos.scores import ViewScore, brightness_spread
+from rift_cl.commands.fit_photos.scores import ViewScore, brightness_of, mean_scores
 from rift_cl.commands.fit_photos.settings import FitPhotosSettings
 from rift_cl.commands.pictures.evenly_spaced import evenly
 from rift_cl.report.html_page import Compared, Page
@@ -19,6 +19,8 @@ from rift_cl.train.loss.homogenisation import ENOUGH_VIEWS, USUAL_EXPONENT
 _SHOWN = 3
 # A fit of photographs of one exposure is off by a percent or so in brightness from one to the next.
 _STEADY = 0.04
+# Share of the squared error that factors of brightness must explain to be worth a sentence.
+_EXPLAINED = 0.35
 # Errors are shown this much brighter.
 ERROR_GAIN = 5.0
 
@@ -103,13 +105,27 @@ def octave_notes(metrics: Mapping[str, Any]) -> list[str]:
 
 def brightness_notes(settings: FitPhotosSettings, scores: Sequence[ViewScore]) -> list[str]:
     """A sentence about exposures that change, where they were not fitted."""
-    spread = brightness_spread(scores)
-    if settings.training.refine_exposures or spread < _STEADY:
+    spread, explained = brightness_of(scores)
+    steady = spread < _STEADY or explained < _EXPLAINED
+    if settings.training.refine_exposures or steady:
         return []
     return [
         f"The held-out photographs are brighter or darker than the fit by {100 * spread:.0f} % "
-        "(standard deviation): exposures seem to change from one to the next. --refine-exposures "
-        "fits a gain and an offset of each photograph."
+        f"(standard deviation), which is {100 * explained:.0f} % of the squared error: exposures "
+        "seem to change from one to the next. --refine-exposures fits a gain and an offset of each "
+        "photograph."
+    ]
+
+
+def doubt_notes(scores: Sequence[ViewScore]) -> list[str]:
+    """A sentence about a fit that is no better than no fit, on photographs held out."""
+    found = mean_scores(scores)
+    if "blend_psnr" not in found or found["fit_psnr"] > found["blend_psnr"]:
+        return []
+    return [
+        f"The fit ({found['fit_psnr']:.1f} dB) is no better on held-out photographs than the mean "
+        f"of the two nearest training ones ({found['blend_psnr']:.1f} dB): it had too few steps or "
+        "splats, or poses, intrinsics or masks are not those of the photographs."
     ]
 
 

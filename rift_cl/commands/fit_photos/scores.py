@@ -13,7 +13,7 @@ import math
 import operator
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -134,19 +134,35 @@ def mean_scores(scores: Sequence[ViewScore]) -> dict[str, float]:
     }
 
 
-def brightness_spread(scores: Sequence[ViewScore]) -> float:
-    """Standard deviation of how much brighter pictures are than they were drawn, as a fraction.
+class Brightness(NamedTuple):
+    """How much brighter pictures are than they were drawn.
 
-    Each picture's factor is that of least squares. Photographs of one exposure have a spread of a
-    percent or so; what a fit could not explain by the scene alone is in it.
+    Args:
+        spread: standard deviation of the pictures' factors, as a fraction.
+        explained: share of the squared error that is gone once each picture has its factor.
     """
-    factors = []
+
+    spread: float
+    explained: float
+
+
+def brightness_of(scores: Sequence[ViewScore]) -> Brightness:
+    """Factors of pictures by least squares, and what they explain.
+
+    Photographs of one exposure have a spread of a percent or so, and where they have more because a
+    fit fails, no factor explains its errors.
+    """
+    factors, before, after = [], 0.0, 0.0
     for score in scores:
-        square = float((score.image.astype(np.float64) ** 2).sum())
-        product = float((score.image.astype(np.float64) * score.truth).sum())
+        image, truth = score.image.astype(np.float64), score.truth.astype(np.float64)
+        square, product = float((image**2).sum()), float((image * truth).sum())
         if square > 0 and product > 0:
             factors.append(product / square)
-    return float(np.std(np.log(factors))) if len(factors) > 1 else 0.0
+            before += float(((image - truth) ** 2).sum())
+            after += float((truth**2).sum()) - product**2 / square
+    if len(factors) < 2 or before <= 0:
+        return Brightness(0.0, 0.0)
+    return Brightness(float(np.std(np.log(factors))), 1 - after / before)
 
 
 def score_record(groups: Mapping[str, Sequence[ViewScore]]) -> dict[str, Any]:

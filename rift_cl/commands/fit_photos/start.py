@@ -13,6 +13,8 @@ from rift_cl.io.captures.capture import Capture
 from rift_cl.train.parameters import Parameters
 from rift_cl.train.start.points import far_points, hull_points, random_points, start_splats
 
+# Fewer sparse points tell nothing of where a scene is.
+_FEWEST = 20
 # A fit begins with no more random splats than this share of all it may have.
 _FIRST_SHARE = 0.5
 # Share of these beyond what the cameras have in common.
@@ -30,9 +32,9 @@ def first_splats(
     guessed: int,
     seed: int,
 ) -> Parameters:
-    """At most ``count`` splats at the capture's points, or ``guessed`` if it has none."""
+    """At most ``count`` splats at the capture's points, or ``guessed`` if it has next to none."""
     points, colors = capture.points, capture.point_colors
-    if points is None or len(points) == 0:
+    if points is None or len(points) < min(_FEWEST, count):
         points, colors = _guessed(pictures, guessed, seed), None
     elif len(points) > count:
         random = np.random.default_rng((seed, 0x901))

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from rift_cl.commands.cameras.fit_cameras import CAMERA_FILES, FitCameras, open_fit_cameras
 from rift_cl.commands.fit_photos.pictures import Light
+from rift_cl.commands.inputs.scene_bounds import bounds_of_splats
 from rift_cl.commands.run_folder.saved_settings import read_settings
 from rift_cl.errors import FileFormatError, InputError
 from rift_cl.io.images.display_light import to_display, to_linear
@@ -108,9 +109,14 @@ class OpenedScene:
         return replace(self.splats, environment=light)
 
     def _rendering(self) -> SplatSettings:
-        """How the fit drew its splats; the defaults where there is no fit."""
+        """How the fit drew its splats; the defaults where there is no fit.
+
+        Of a small scene the near plane is nearer than by default, which might leave out all of it.
+        """
         if self._settings is None:
-            return SplatSettings()
+            usual = SplatSettings()
+            nearer = usual.for_scene(bounds_of_splats(self.splats).radius)
+            return min(usual, nearer, key=lambda settings: settings.near_plane)
         record = self._settings.values.get("rendering", {})
         return read_settings(SplatSettings, record, f"{self._settings.where}: rendering")
 

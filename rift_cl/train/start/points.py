@@ -20,6 +20,17 @@ _Y0 = 0.28209479177387814
 _OPACITY = 0.1
 # A splat begins as large as the distance to so many neighbours.
 _NEIGHBOURS = 3
+# Condition number of axes that are parallel to rounding, and the root mean square angle, in degrees,
+# up to which axes that do not meet count as such.
+_PARALLEL, _NEARLY = 1e8, 2.0
+# Root mean square angle by which axes miss a point where they meet, as a share of the spread of
+# directions.
+_MISSED = 0.6
+# Step from one camera to the next where they look side by side, as a share of what a picture shows.
+_STEP = 0.25
+# Depths at which random points begin before cameras that look side by side and have no volume in
+# common, as shares of that depth.
+_BESIDE = (0.5, 2.0)
 # Share of the views that must see a random point, and how often points are drawn.
 _SHARE_OF_VIEWS, _TRIES = 0.5, 400
 # How far beyond the focus surroundings begin and end, in distances of the cameras from it.
@@ -42,15 +53,70 @@ def scene_extent(cameras: Sequence[Camera]) -> float:
     return float(np.linalg.norm(focus_of(cameras) - centers[0])) or 1.0
 
 
+def scene_size(cameras: Sequence[Camera]) -> float:
+    """The length that scales and depths are measured in.
+
+    It is the median distance of the cameras from their focus, or how far they spread where that is
+    more, as of cameras that look outward. No unit of a scene's coordinates changes a fit then.
+    """
+    away = np.linalg.norm([camera.center for camera in cameras] - focus_of(cameras), axis=1)
+    return max(float(np.median(away)), scene_extent(cameras))
+
+
 def focus_of(cameras: Sequence[Camera]) -> Floats:
-    """The point nearest to all optical axes, (3,); before the cameras if they are parallel."""
+    """The point nearest to all optical axes, (3,).
+
+    Cameras that look side by side have none that means anything: it is then before their middle, as
+    far as pictures of neighbours share most of what they show.
+    """
+    nearest = _nearest_to_axes(cameras)
+    if nearest is not None:
+        return nearest
+    centers = np.array([camera.center for camera in cameras])
+    axes = np.array([camera.view[2, :3] for camera in cameras])
+    return np.asarray(centers.mean(axis=0) + _overlap_depth(cameras, centers) * axes.mean(axis=0))
+
+
+def _nearest_to_axes(cameras: Sequence[Camera]) -> Floats | None:
+    """The point nearest to all axes; None of axes that are parallel, or nearly, and do not meet."""
     centers = np.array([camera.center for camera in cameras])
     axes = np.array([camera.view[2, :3] for camera in cameras])
     across = np.eye(3) - axes[:, :, None] * axes[:, None, :]
     normal = across.sum(axis=0)
-    if np.linalg.cond(normal) > 1e8:
-        return np.asarray(centers.mean(axis=0) + axes.mean(axis=0))
-    return np.asarray(np.linalg.solve(normal, (across @ centers[:, :, None]).sum(axis=0))[:, 0])
+    if np.linalg.cond(normal) > _PARALLEL:
+        return None
+    focus = np.linalg.solve(normal, (across @ centers[:, :, None]).sum(axis=0))[:, 0]
+    # Its smallest eigenvalue is the sum of the axes' squared angles to the direction in common.
+    turned = np.linalg.eigvalsh(normal)[0] > len(cameras) * np.radians(_NEARLY) ** 2
+    return np.asarray(focus) if turned or axes_meet(cameras, focus) else None
+
+
+def _perspective(cameras: Sequence[Camera]) -> bool:
+    return all(camera.model != "ortho" for camera in cameras)
+
+
+def axes_meet(cameras: Sequence[Camera], focus: Floats) -> bool:
+    """Whether the axes of cameras meet near a point, in front of them.
+
+    They do if their axes turn with the directions in which they see it: if they miss it by angles
+    that are small beside the spread of those directions.
+    """
+    ways = focus - np.array([camera.center for camera in cameras])
+    ways /= np.maximum(np.linalg.norm(ways, axis=1, keepdims=True), 1e-300)
+    axes = np.array([camera.view[2, :3] for camera in cameras])
+    mean = ways.mean(axis=0) / (np.linalg.norm(ways.mean(axis=0)) or 1.0)
+    # One less the cosine is half the square of a small angle.
+    missed, spread = np.mean(1 - (ways * axes).sum(axis=1)), np.mean(1 - ways @ mean)
+    return bool(missed < _MISSED**2 * spread)
+
+
+def _overlap_depth(cameras: Sequence[Camera], centers: Floats) -> float:
+    """The depth at which pictures of neighbours, side by side, share most of what they show."""
+    if len(cameras) < 2:
+        return 1.0
+    spacing = float(np.median(cKDTree(centers).query(centers, k=2)[0][:, 1]))
+    widths = [min(camera.size) / camera.intrinsics[0] for camera in cameras]
+    return spacing / (_STEP * float(np.median(widths))) or 1.0
 
 
 def field_diameter(cameras: Sequence[Camera]) -> float:
@@ -67,8 +133,10 @@ def field_diameter(cameras: Sequence[Camera]) -> float:
 def random_points(cameras: Sequence[Camera], count: int, seed: int) -> Floats:
     """Points at random in the volume that at least half of the cameras see, (N, 3).
 
+    Of cameras side by side, as of a survey, that have no such volume, on rays of each.
+
     Raises:
-        InputError: the cameras have no volume in common.
+        InputError: the cameras look elsewhere, or have no volume in common.
     """
     random = np.random.default_rng((seed, 0x57A7))
     middle = focus_of(cameras)
@@ -80,8 +148,20 @@ def random_points(cameras: Sequence[Camera], count: int, seed: int) -> Floats:
         found.append(points[_seen_by(cameras, points) >= _SHARE_OF_VIEWS])
         if sum(map(len, found)) >= count:
             return np.concatenate(found)[:count]
+    if _nearest_to_axes(cameras) is None and _perspective(cameras):
+        which = random.integers(len(cameras), size=count)
+        depth = reach if len(cameras) == 1 else _overlap_depth(cameras, centers)
+        return _on_rays(cameras, which, depth * random.uniform(*_BESIDE, count), random)
+    depths = [camera.view[2, :3] @ middle + camera.view[2, 3] for camera in cameras]
+    if np.mean(np.array(depths) > 0) < _SHARE_OF_VIEWS:
+        raise InputError(
+            "most cameras have the place where their axes meet behind them: poses are probably "
+            "given with other axes (OpenCV's for OpenGL's, or the other way round), or from world "
+            "to camera; cameras that do look outward want points to begin with"
+        )
     raise InputError(
-        "the cameras have no volume in common that half of them see: give points to begin with"
+        "there is no volume that half of the cameras see: check poses and intrinsics, or give "
+        "points to begin with"
     )
 
 
@@ -99,8 +179,18 @@ def far_points(cameras: Sequence[Camera], count: int, seed: int) -> Floats:
     first, last = (factor * (float(np.median(away)) or 1.0) for factor in _SURROUNDINGS)
     which = random.integers(len(cameras), size=count)
     depths = away[which] + 1 / random.uniform(1 / last, 1 / first, count)
-    places = random.uniform(size=(count, 2))
-    points = np.empty((count, 3))
+    return _on_rays(cameras, which, depths, random)
+
+
+def _on_rays(
+    cameras: Sequence[Camera],
+    which: NDArray[np.int64],
+    depths: Floats,
+    random: np.random.Generator,
+) -> Floats:
+    """Points at depths on random pixels of some of the cameras, (N, 3)."""
+    places = random.uniform(size=(len(which), 2))
+    points = np.empty((len(which), 3))
     for number, camera in enumerate(cameras):
         mine = which == number
         fx, fy, cx, cy = camera.intrinsics

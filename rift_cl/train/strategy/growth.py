@@ -44,8 +44,8 @@ class GrowthSettings(StrategySettings):
     """Opacity up to which a splat counts as transparent and is relocated."""
     opacity_penalty: float = 0.01
     """Weight of the mean opacity in the loss."""
-    scale_penalty: float = 0.01
-    """Weight of the mean scale in the loss, with scales in units of the scene."""
+    scale_penalty: float = 0.05
+    """Weight of the mean scale in the loss, with scales as shares of the size of the scene."""
 
     def __post_init__(self) -> None:
         """Check every number's range."""
@@ -74,7 +74,7 @@ class GrowthStrategy(Strategy):
         settings = self._growing
         if step >= self.run.cooldown:
             return Penalties()
-        return Penalties(settings.opacity_penalty, settings.scale_penalty)
+        return Penalties(settings.opacity_penalty, settings.scale_penalty / self.run.size)
 
     def relocates_at(self, step: int) -> bool:
         """Whether splats are relocated after so many steps."""

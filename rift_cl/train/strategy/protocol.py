@@ -32,8 +32,9 @@ class TrainingRun:
         steps: optimization steps of the whole run.
         splats: most splats that there may be.
         seed: random seed; draw from (seed, step), so that a resumed run repeats the same bits.
-        extent: size of the scene, in its units.
+        extent: the length that positions' learning rates are measured in: how far cameras spread.
         cooldown: the step with which the cooldown begins.
+        size: the length that scales are measured in: about how far cameras are from what they see.
     """
 
     steps: int
@@ -41,6 +42,7 @@ class TrainingRun:
     seed: int
     extent: float
     cooldown: int
+    size: float = 1.0
 
 
 # How alike two names are of which one is the other misspelt.

@@ -70,8 +70,8 @@ class ResidualSettings(GrowthSettings):
     """Fraction of the run after which splats are no longer relocated, and their number stays."""
     opacity_penalty: float = 0.0
     """Weight of the mean opacity in the loss."""
-    scale_penalty: float = 0.04
-    """Weight of the mean scale in the loss, with scales in units of the scene."""
+    scale_penalty: float = 0.2
+    """Weight of the mean scale in the loss, with scales as shares of the size of the scene."""
     views: int = 20
     """Training views before a relocation that say what each splat contributes: those of so many
     steps, or of all since the last relocation where these are fewer."""

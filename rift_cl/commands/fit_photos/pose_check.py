@@ -1,0 +1,114 @@
+"""Whether poses are those of the scene: checked before hours are spent on ones that are not.
+
+Poses with other axes than a file's should have, or from world to camera where the other way is
+meant, let cameras look away from the sparse points that were found by the same program. Coordinates
+far from the origin, as surveys have them, leave float32 too few digits for what lies between them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rift_cl.commands.pictures.evenly_spaced import evenly
+from rift_cl.errors import InputError
+from rift_cl.geometry import Camera
+from rift_cl.train.start.points import scene_size
+
+Floats = NDArray[np.float64]
+
+# Cameras and points that are looked at.
+_CAMERAS, _POINTS = 64, 5_000
+# Share of the points that lies in a picture, in the median, from which poses are believed, and that
+# other poses must reach to be named.
+_FEWEST, _MANY = 0.02, 0.2
+# Turns the axes of OpenGL's cameras into those of OpenCV's, and back.
+_TURN = np.diag([1.0, -1.0, -1.0, 1.0])
+_OTHER_AXES = (
+    "the poses fit if the axes of their cameras are turned: they are OpenCV's (x right, y down, z "
+    "forward) where OpenGL's (x right, y up, z back) are expected, or the other way round"
+)
+_OTHER_WAY = (
+    "the poses fit if they are inverted: they lead from world to camera where camera to world is "
+    "expected, or the other way round"
+)
+# Rounding of float32 that a scene survives, as a share of its size.
+_ROUNDING = 2e-4
+
+
+def check_poses(cameras: Sequence[Camera], points: NDArray[np.float32] | None, where: Path) -> None:
+    """Check that cameras look at the sparse points, and that float32 tells places apart.
+
+    Args:
+        cameras: of the photographs.
+        points: (P, 3) sparse points; None where there are none.
+        where: named in errors.
+
+    Raises:
+        InputError: they do not.
+    """
+    _check_offset(cameras, where)
+    if points is None or not len(points):
+        return
+    few = [cameras[number] for number in evenly(len(cameras), _CAMERAS)]
+    some = np.asarray(points[evenly(len(points), _POINTS)], np.float64)
+    share = _seen(few, some)
+    if share >= _FEWEST:
+        return
+    reason = "check the poses, the intrinsics, and that the points belong to them"
+    for words, others in _other_poses(few):
+        if _seen(others, some) >= _MANY:
+            reason = words
+            break
+    raise InputError(
+        f"{where}: half of the photographs show less than {100 * _FEWEST:.0f} % of the sparse "
+        f"points: {reason}"
+    )
+
+
+def _check_offset(cameras: Sequence[Camera], where: Path) -> None:
+    centers = np.array([camera.center for camera in cameras])
+    size = scene_size(cameras)
+    step = float(np.spacing(np.float32(np.abs(centers).max())))
+    if step <= _ROUNDING * size:
+        return
+    middle = ", ".join(f"{value:.0f}" for value in centers.mean(axis=0))
+    raise InputError(
+        f"{where}: the cameras stand up to {np.abs(centers).max():.3g} from the origin, where "
+        f"float32 has steps of {step:.2g}, too coarse for a scene of about {size:.3g}: subtract "
+        f"({middle}) from all positions and points"
+    )
+
+
+def _seen(cameras: Sequence[Camera], points: Floats) -> float:
+    """The share of the points within each picture, of all pictures the median."""
+    shares = []
+    for camera in cameras:
+        local = points @ camera.view[:3, :3].T + camera.view[:3, 3]
+        front = local[:, 2] > 0
+        if camera.model == "fisheye":
+            # Pictures of such lenses may reach round by half a turn.
+            shares.append(front.mean())
+            continue
+        depth = 1.0 if camera.model == "ortho" else np.where(front, local[:, 2], 1.0)
+        fx, fy, cx, cy = camera.intrinsics
+        x, y = fx * local[:, 0] / depth + cx, fy * local[:, 1] / depth + cy
+        inside = (x >= 0) & (x <= camera.width) & (y >= 0) & (y <= camera.height)
+        shares.append((front & inside).mean())
+    return float(np.median(shares))
+
+
+def _other_poses(cameras: Sequence[Camera]) -> Iterator[tuple[str, list[Camera]]]:
+    """What poses may have been meant as, in words, and the cameras that they then are."""
+    turned = [replace(camera, view=_TURN @ camera.view) for camera in cameras]
+    yield _OTHER_AXES, turned
+    for before, after in ((np.eye(4), np.eye(4)), (np.eye(4), _TURN), (_TURN, _TURN)):
+        inverted = [before @ np.linalg.inv(camera.view) @ after for camera in cameras]
+        yield (
+            _OTHER_WAY,
+            [replace(c, view=view) for c, view in zip(cameras, inverted, strict=True)],
+        )
