@@ -9,7 +9,7 @@ import pytest
 from browser import CHROMIUM, Page, stop, until
 
 from rift_cl.commands.cli import main
-from rift_cl.commands.view.browser_splats import seen_colors
+from rift_cl.commands.view.browser_splats import browser_splats, seen_colors
 from rift_cl.geometry import Camera
 from rift_cl.io.output import write_json
 from rift_cl.io.scenes.splat_scene import SplatScene
@@ -123,6 +123,17 @@ def test_colours_are_those_that_cameras_before_a_splat_see():
     np.testing.assert_allclose(seen[0], 0.5 + 0.4886025 * 0.8 * np.array([1, 0, -1]), atol=1e-6)
     nobody = seen_colors(scene, [Camera(SIZE, lens, behind)])
     np.testing.assert_allclose(nobody[0], 0.5)
+
+
+def test_splats_as_wide_as_the_sky_are_half_floats():
+    """Those of stray points grow until they are; viser sends covariances as half floats."""
+    wide = np.array([[20.0, 6.0, 6.5], [np.log(250.0), 0.0, 1.0]])
+    quats = np.tile([1.0, 0.3, 0.2, 0.1], (2, 1))
+    scene = SplatScene(np.zeros((2, 3)), wide, quats, [0.0, 0.0], np.zeros((2, 1, 3)))
+    camera = Camera(SIZE, [[FOCAL, 0, 200], [0, FOCAL, 150], [0, 0, 1]], view_from(4.0))
+    covariances = browser_splats(scene, [camera], 1.0)["covariances"]
+    assert np.isfinite(covariances.astype(np.float16)).all()
+    np.testing.assert_allclose(np.linalg.eigvalsh(covariances[1])[-1], 250.0**2, rtol=1e-6)
 
 
 def test_without_viser_there_is_a_sentence(fit, tmp_path, monkeypatch, capsys):

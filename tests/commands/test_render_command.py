@@ -157,6 +157,17 @@ def test_a_path_has_frames_between_its_views(scene, capture, tmp_path):
     assert read_image(tmp_path / "small" / "frames" / "0003.png").shape == (12, 16, 3)
 
 
+def test_lenses_that_distort_are_told_of(scene, capture, tmp_path, capsys):
+    assert render(scene, tmp_path / "film", "--path", capture, "--dry-run") == 0
+    assert "distort" not in capsys.readouterr().err
+    record = json.loads((capture / "transforms.json").read_text()) | {"camera_model": "OPENCV"}
+    record["frames"][1]["k1"] = 0.1
+    write_json(tmp_path / "transforms.json", record)
+    path = tmp_path / "transforms.json"
+    assert render(scene, tmp_path / "film", "--path", path, "--dry-run") == 0
+    assert "1 of 4 views of --path have a lens that distorts" in capsys.readouterr().err
+
+
 def test_the_folder_of_a_fit_brings_its_drawing_and_background_along(scene, tmp_path, capsys):
     fit = tmp_path / "fit"
     fit.mkdir()

@@ -99,6 +99,21 @@ def test_a_file_without_usable_frames(
         open_capture(made.transforms(tmp_path, **changes))
 
 
+@pytest.mark.parametrize(
+    ("field", "edge", "value"),
+    [("cx", "w", made.WIDTH), ("cx", "w", 13.0), ("cy", "h", made.HEIGHT), ("cy", "h", -1.0)],
+)
+def test_intrinsics_of_pictures_of_another_size(
+    tmp_path: Path, field: str, edge: str, value: float
+) -> None:
+    """The middle of pictures twice as large is the corner of these."""
+    path = made.transforms(tmp_path, **{field: value})
+    assert getattr(open_capture(path).views[0].camera, "width" if edge == "w" else "height")
+    path = made.transforms(tmp_path, **{field: value, edge: None})
+    with pytest.raises(InputError, match=rf"a\.png.*'{field}' is .*another size"):
+        open_capture(path)
+
+
 def test_images_that_are_listed_twice(tmp_path: Path) -> None:
     path = made.transforms(tmp_path)
     for name in ("images/a.png", "./images/../images//a.png", "images\\a.png", "images/a"):
@@ -179,6 +194,8 @@ def edited(path: Path, old: str, new: str) -> None:
         ("images", r"^1( [^ ]*){4}", "1 0 0 0 0", r"image 'a\.png': the quaternion .* zero"),
         ("images", r"7 a\.png", "", "line 3: has 8 entries"),
         ("images", r"^1 [^ ]*", "1 north", "line 3: .* no numbers"),
+        ("images", r"^1\.5 2\.5 -1$", "1.5 2.5", "line 6: has 2 entries"),
+        ("images", r"^1\.5 2\.5 -1$", "1.5 2.5 -1 9.5", "line 6: has 4 entries"),
         ("points3D", "^0 0.5", "0 inf", "point 0 is not finite"),
         ("points3D", " 255 0 0 ", " 256 0 0 ", "colour is .256, 0, 0"),
         ("points3D", " 255 0 0 .*", "", "line 1: has 4 entries"),

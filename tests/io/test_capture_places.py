@@ -30,6 +30,18 @@ def test_masks_of_a_colmap_model(tmp_path: Path) -> None:
     assert masks == [tmp_path / "masks" / "a.png.png", None, tmp_path / "masks" / "sub" / "c.png"]
 
 
+@pytest.mark.each
+@pytest.mark.parametrize("folder", ["masks", "mask"])
+@pytest.mark.parametrize("name", ["a.jpg", "a.png.jpg", "a.jpeg", "a.tif", "a.tiff"])
+def test_masks_of_other_formats_and_folders(tmp_path: Path, folder: str, name: str) -> None:
+    path = made.transforms(tmp_path)
+    made.photographs(tmp_path / folder, [name])
+    found = [view.mask for view in open_capture(path).views]
+    assert found == [tmp_path / folder / name, None, None]
+    made.photographs(tmp_path / "masks", ["a.png"])
+    assert open_capture(path).views[0].mask == tmp_path / "masks" / "a.png"
+
+
 @pytest.mark.parametrize("below", ["", "images"])
 @pytest.mark.parametrize("write", [made.colmap_binary, made.colmap_text])
 def test_a_model_far_from_its_photographs(tmp_path: Path, below: str, write: type) -> None:

@@ -7,8 +7,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from heic_file import HEIC
+from heic_file import HEIC, heic_with_profile
 from photograph_files import run
+from PIL import ImageCms
 from view_files import store
 
 from rift_cl.errors import FileFormatError, InputError, ResourceLimitError
@@ -44,6 +45,27 @@ def test_pixels_come_upright(photograph: Path) -> None:
         ((-4, -4), (40, 90, 160)),
     ):
         np.testing.assert_allclose(255 * image[place], color, atol=2)
+
+
+def test_primaries_of_phones_are_named(photograph: Path) -> None:
+    pytest.importorskip("pi_heif")
+    assert read_picture_header(photograph).profile == ""
+    # Primaries of SMPTE EG 432-1 for those of BT.709.
+    photograph.write_bytes(HEIC.replace(b"nclx\0\x01", b"nclx\0\x0c"))
+    assert read_picture_header(photograph).profile == "Display P3"
+
+
+@pytest.mark.parametrize("damaged", [False, True])
+def test_the_profile_of_a_phone_is_named(photograph: Path, damaged: bool) -> None:
+    """In place of the numbers above; a profile that cannot be read costs no pixels."""
+    pytest.importorskip("pi_heif")
+    profile = ImageCms.ImageCmsProfile(ImageCms.createProfile("sRGB")).tobytes()
+    old, new = (name.encode("utf-16-be") for name in ("sRGB built-in", "Display P3\0\0\0"))
+    profile = profile.replace(old, new)
+    photograph.write_bytes(heic_with_profile(b"damaged" if damaged else profile))
+    wanted = "without a name" if damaged else "Display P3"
+    assert read_picture_header(photograph).profile == wanted
+    assert read_image(photograph).shape == (64, 48, 3)
 
 
 def test_damage_and_size_are_named(photograph: Path) -> None:

@@ -142,6 +142,26 @@ def test_a_name_with_a_blank_in_a_text_model(tmp_path: Path) -> None:
     assert open_capture(tmp_path).views[0].name == "a b.png"
 
 
+@pytest.mark.parametrize("left_out", [(0,), (0, 1, 2), (1, 2)])
+def test_lines_of_features_may_be_left_out(tmp_path: Path, left_out: tuple[int, ...]) -> None:
+    """As many scripts do, of some images or of all; every image is there."""
+    made.photographs(tmp_path)
+    path = made.colmap_text(tmp_path) / "images.txt"
+    head, *lines = path.read_text().split("\n\n", 1)
+    lines = lines[0].split("\n")
+    kept = [line for k, line in enumerate(lines) if k % 2 == 0 or k // 2 not in left_out]
+    path.write_text("\n".join([head, *kept]))
+    check_cameras(open_capture(tmp_path))
+
+
+def test_a_name_that_is_a_number_in_a_text_model(tmp_path: Path) -> None:
+    path = made.colmap_text(tmp_path) / "images.txt"
+    lines = [line for line in path.read_text().replace("a.png", "0001").split("\n") if line]
+    path.write_text("\n".join(lines[1:2] * 2).replace("0001", "0002", 1))
+    views = open_capture(tmp_path, photographs=False).views
+    assert [view.name for view in views] == ["0001", "0002"]
+
+
 @pytest.mark.parametrize("text", [True, False])
 @pytest.mark.parametrize("colors", [True, False])
 def test_points_of_a_transforms_json(tmp_path: Path, text: bool, colors: bool) -> None:

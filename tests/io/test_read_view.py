@@ -10,7 +10,7 @@ import pytest
 from view_files import HEIGHT, WIDTH, K, display, linear, store, view_of
 
 from rift_cl.geometry.camera import Camera
-from rift_cl.io import camera_at, read_view, write_png
+from rift_cl.io import camera_at, read_image, read_view, write_png
 
 RANDOM = np.random.default_rng(5)
 
@@ -130,6 +130,39 @@ def test_a_mask_is_multiplied_into_alpha(tmp_path: Path, channels: int) -> None:
         np.testing.assert_allclose(image[..., :3], codes[..., :3] / 255, atol=1e-6)
         alpha = codes[..., 3:] / 255 if count == 4 else 1
         np.testing.assert_allclose(image[..., 3:], cover * alpha, atol=1e-6)
+
+
+@pytest.mark.parametrize("color", [0, 90, 255])
+def test_alpha_is_the_mask_where_it_varies_and_colours_do_not(tmp_path: Path, color: int) -> None:
+    write_png(tmp_path / "a.png", np.zeros((HEIGHT, WIDTH, 3), np.uint8))
+    mask = np.full((HEIGHT, WIDTH, 4), color, np.uint8)
+    mask[..., 3] = RANDOM.integers(0, 256, (HEIGHT, WIDTH))
+    write_png(tmp_path / "mask.png", mask)
+    image = read_view(view_of(tmp_path / "a.png", tmp_path / "mask.png"))
+    np.testing.assert_allclose(image[..., 3], mask[..., 3] / 255, atol=1e-6)
+
+
+def test_a_lossy_mask_is_black_or_white(tmp_path: Path) -> None:
+    write_png(tmp_path / "a.png", np.zeros((HEIGHT, WIDTH, 3), np.uint8))
+    counted = np.zeros((HEIGHT, WIDTH), bool)
+    counted[13:41, 22:57] = True
+    codes = np.where(counted, 255, 0).astype(np.uint8)[..., None]
+    path = store(tmp_path / "mask.jpg", codes, "uint8", Compression="jpeg:60")
+    assert np.unique(read_image(path)).size > 2
+    image = read_view(view_of(tmp_path / "a.png", path))
+    np.testing.assert_array_equal(image[..., 3], counted)
+
+
+@pytest.mark.parametrize("light", ["display", "linear"])
+@pytest.mark.parametrize("kind", ["uint8", "uint16"])
+def test_a_png_of_gamma_1_holds_linear_light(tmp_path: Path, kind: str, light: str) -> None:
+    scene = RANDOM.uniform(0.05, 1, (HEIGHT, WIDTH, 3))
+    stored = scene.astype(np.float32)
+    view = view_of(store(tmp_path / "a.png", stored, kind, **{"oiio:ColorSpace": "linear"}))
+    error = 0.6 / 255 if kind == "uint8" else 1e-5
+    wanted = scene if light == "linear" else display(scene)
+    # The curve is steeper than 1, up to 3 from this light on.
+    np.testing.assert_allclose(read_view(view, light=light), wanted, atol=3 * error)
 
 
 @pytest.mark.parametrize("light", ["display", "linear"])

@@ -77,5 +77,7 @@ def test_arrays_that_make_no_scan_are_refused(tmp_path):
         rift.scan_of_arrays(path, VALUES, ANGLES[1:])
     with pytest.raises(NonFiniteError, match="angle 0"):
         rift.scan_of_arrays(path, VALUES, np.full(VIEWS, np.nan))
+    with pytest.raises(InputError, match=r"scan\.raw.*degrees"):
+        rift.scan_of_arrays(path, VALUES, np.arange(VIEWS) * 180.0 / VIEWS)
     flats = np.ones((2, ROWS, BINS))
     assert rift.scan_of_arrays(path, VALUES, ANGLES, flats=flats).kind == "counts"

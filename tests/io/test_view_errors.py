@@ -107,3 +107,13 @@ def test_a_mask_of_zeros_and_ones_is_no_black_one(tmp_path: Path) -> None:
     write_png(tmp_path / "m.png", mask)
     with pytest.raises(FileFormatError, match=r"m\.png: .*mask"):
         read_view(view)
+
+
+@pytest.mark.parametrize("alpha", [0, 255])
+def test_a_mask_that_tells_nothing_by_colours_or_alpha(tmp_path: Path, alpha: int) -> None:
+    write_png(tmp_path / "a.png", np.zeros((HEIGHT, WIDTH, 3), np.uint8))
+    mask = np.zeros((HEIGHT, WIDTH, 4), np.uint8)
+    mask[..., 3] = alpha
+    write_png(tmp_path / "m.png", mask)
+    with pytest.raises(FileFormatError, match=r"m\.png: .*alpha"):
+        read_view(view_of(tmp_path / "a.png", tmp_path / "m.png"))

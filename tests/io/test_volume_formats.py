@@ -185,6 +185,19 @@ def test_mrc(tmp_path: Path, dtype: str) -> None:
         assert file.get_labels()[0] == "Attenuation in 1/mm"
 
 
+def test_values_without_a_unit_are_noted_as_such(tmp_path: Path) -> None:
+    plain = {"attenuation": False}
+    write(tmp_path / "v.h5", "h5", **plain)
+    with h5py.File(tmp_path / "v.h5") as file:
+        assert (file["volume"].attrs["unit"], file["volume"].attrs["value_unit"]) == ("mm", "1")
+    write(tmp_path / "v.tif", "tiff-stack", **scaled("uint16"), **plain)
+    with tifffile.TiffFile(tmp_path / "v.tif") as file:
+        assert "vunit=1\n" in file.pages.first.description
+    write(tmp_path / "v.mrc", "mrc", **plain)
+    with mrcfile.open(tmp_path / "v.mrc") as file:
+        assert file.get_labels()[0] == "Values without a unit"
+
+
 def test_mrc_of_no_length(tmp_path: Path) -> None:
     write(tmp_path / "v.mrc", "mrc", unit="bin")
     with mrcfile.open(tmp_path / "v.mrc") as file:

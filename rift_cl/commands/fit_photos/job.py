@@ -71,6 +71,8 @@ class Fit(FitRun[FitPhotosSettings]):
         else:
             self.source = open_seen(settings.capture, pinhole=settings.pinhole)
         self.downscale = settings.downscale or 1
+        # What of the capture is not used, or may not be meant, a sentence each.
+        self.capture_notes: tuple[str, ...] = ()
         self.training_views: tuple[View, ...] = ()
         self.test_views: tuple[View, ...] = ()
         if isinstance(self.source, Capture):
@@ -98,6 +100,7 @@ class Fit(FitRun[FitPhotosSettings]):
             "held out": f"{len(self.test_views)} photographs",
             **({"masks": f"{masks} photographs have one"} if masks else {}),
             "largest photograph": f"{largest} pixels, made smaller by {self.downscale}",
+            **({"notes": "; ".join(self.capture_notes)} if self.capture_notes else {}),
             "splats": self._splats,
             "device": self.device.name,
             **self._tried(self.source, largest),
@@ -263,6 +266,7 @@ class Fit(FitRun[FitPhotosSettings]):
 
     def _split(self, capture: Capture) -> None:
         settings = self.settings
+        self.capture_notes = capture.notes
         cameras = [view.camera for view in capture.views]
         check_places(cameras, settings.capture)
         check_poses(cameras, capture.points, settings.capture)
@@ -274,6 +278,7 @@ class Fit(FitRun[FitPhotosSettings]):
     def _notes(self) -> list[str]:
         """What was decided about the photographs, and what of them is not used."""
         notes = list(self.source.notes) if isinstance(self.source, BareInput) else []
+        notes += self.capture_notes
         if self.settings.hold_out and not self.test_views:
             notes.append(
                 f"None of the {len(self.training_views)} photographs was held out: of so few, each "

@@ -12,7 +12,7 @@ from rift_cl.io.captures.capture import Capture, as_pinholes, open_capture
 
 One = TypeVar("One")
 # Photographs up to which none is held out: two tell of depth, one does not.
-FEWEST_VIEWS = 3
+FEWEST_VIEWS = 2
 
 
 def open_seen(path: Path, *, pinhole: bool) -> Capture:

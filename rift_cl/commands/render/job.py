@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import replace
 from functools import cached_property
@@ -34,7 +34,7 @@ from rift_cl.commands.render.settings import LIMITS, MOST_FRAMES, RenderSettings
 from rift_cl.commands.run_folder.run_folder import RunFolder
 from rift_cl.errors import InputError
 from rift_cl.geometry import Camera
-from rift_cl.io.captures.capture import Capture, open_capture
+from rift_cl.io.captures.capture import Capture, View, open_capture
 from rift_cl.io.captures.transforms_record import transforms_of
 from rift_cl.io.images.film_file import film_writer, suffix_of
 from rift_cl.io.images.image import read_image, write_png
@@ -68,6 +68,7 @@ class Render:
         self.scene = settings.open_scene()
         self.bounds = settings.bounds(self.scene)
         self.device = settings.open_device()
+        self._lens_notes: tuple[str, ...] = ()
         cameras = self._path() if settings.path is not None else self._film()
         self.cameras = [
             opened(camera, settings.aperture, settings.focus, self.bounds.center)
@@ -88,7 +89,8 @@ class Render:
     @property
     def notes(self) -> tuple[str, ...]:
         """Assumptions, a sentence each."""
-        return () if self.settings.path is not None else self.settings.notes(self.scene)
+        named = self.settings.path is not None
+        return self._lens_notes if named else self.settings.notes(self.scene)
 
     @property
     def decided(self) -> RenderSettings:
@@ -165,7 +167,9 @@ class Render:
 
     def _path(self) -> list[Camera]:
         settings = self.settings
-        cameras = [view.camera for view in self._named().views]
+        views = self._named().views
+        self._lens_notes = _lens_notes(views)
+        cameras = [view.camera for view in views]
         if settings.size is not None:
             cameras = [resized(camera, settings.size[::-1]) for camera in cameras]
         if len(cameras) + settings.between * (len(cameras) - 1) > MOST_FRAMES:
@@ -316,6 +320,17 @@ class Render:
         self.moving = None if self._kind is None else sheet.embedded(rate)
         page = render_page(self.scene.name, sheet, self.moving, self.metrics)
         self.folder.finish(self.decided, self.metrics, page, self.device, asked=self.settings)
+
+
+def _lens_notes(views: Sequence[View]) -> tuple[str, ...]:
+    """Whether views have lenses that distort, which frames are drawn without."""
+    count = sum(view.lens is not None for view in views)
+    if not count:
+        return ()
+    return (
+        f"{count} of {len(views)} views of --path have a lens that distorts: frames are drawn "
+        "without distortion",
+    )
 
 
 def _frame_file(number: int) -> str:

@@ -27,6 +27,8 @@ Floats = NDArray[np.float64]
 AWAY = 10.0
 # Cameras that colours are averaged over, and splats at a time.
 _CAMERAS, _BLOCK = 32, 8192
+# Largest standard deviation in the unit that is sent: its square is a half float, below 65504.
+_WIDEST = 250.0
 
 
 def browser_can(scene: SplatScene) -> bool:
@@ -45,7 +47,8 @@ def browser_splats(scene: SplatScene, cameras: Sequence[Camera], unit: float) ->
         unit: that lengths are multiplied by.
     """
     rotations = matrices_of(scene.quats.astype(np.float64))
-    frames = rotations * (np.exp(scene.log_scales.astype(np.float64)) * unit)[:, None, :]
+    log_scales = np.minimum(scene.log_scales.astype(np.float64) + np.log(unit), np.log(_WIDEST))
+    frames = rotations * np.exp(log_scales)[:, None, :]
     return {
         "centers": scene.means.astype(np.float64) * unit,
         "covariances": frames @ np.swapaxes(frames, 1, 2),

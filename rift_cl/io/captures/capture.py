@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import os
+from dataclasses import replace
 from pathlib import Path
 
 from rift_cl.errors import InputError
 from rift_cl.io.boundary import reading
+from rift_cl.io.captures.capture_notes import color_notes
 from rift_cl.io.captures.colmap_model import MODEL_FOLDERS, find_model, open_model
 from rift_cl.io.captures.photograph_folder import (
     other_files,
@@ -41,13 +43,13 @@ def open_capture(
     images: str | os.PathLike[str] | None = None,
     photographs: bool = True,
 ) -> Capture:
-    """Find the posed photographs of a capture; the photographs themselves are not read.
+    """Find the posed photographs of a capture; of the photographs, headers alone are read.
 
     Args:
         path: a ``transforms.json`` of any name, in the flavours of NeRF's synthetic scenes,
             instant-ngp and nerfstudio; or a folder with one; or a folder with a COLMAP model
             in ``sparse/0``, in ``sparse`` or in itself, binary or text, and the photographs in
-            ``images`` there or above. Masks of a COLMAP model lie in ``masks`` beside ``images``.
+            ``images`` there or above. Masks lie in ``masks`` beside ``images`` (see ``mask_of``).
         images: the folder of the photographs, or the one that has them in ``images``, where a
             COLMAP model lies somewhere else; masks lie in ``masks`` there.
         photographs: whether they have to be there; without them, views can be counted with but
@@ -69,11 +71,11 @@ def open_capture(
         path = _absolute(path)
         file = _transforms(path)
         if file is not None and images is None:
-            return open_transforms(file, photographs=photographs)
+            return _told(open_transforms(file, photographs=photographs), photographs)
         model = find_model(path)
     if model is not None:
         folder = None if images is None else photographs_in(Path(images))
-        return open_model(path, *model, folder, photographs=photographs)
+        return _told(open_model(path, *model, folder, photographs=photographs), photographs)
     if images is not None:
         raise InputError(f"{path}: holds no COLMAP model, to which images= could belong")
     bare = photograph_names(photographs_in(path))
@@ -89,6 +91,13 @@ def open_capture(
         f"and images, .bin or .txt, of a COLMAP model in {', '.join(MODEL_FOLDERS)}"
         f"{hint if bare else ''}"
     )
+
+
+def _told(capture: Capture, photographs: bool) -> Capture:
+    """With what is to be said of the photographs' colours, if they are there."""
+    if not photographs:
+        return capture
+    return replace(capture, notes=(*capture.notes, *color_notes(capture.views)))
 
 
 def capture_name(path: Path) -> str:

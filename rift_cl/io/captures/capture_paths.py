@@ -14,6 +14,9 @@ from pathlib import Path, PureWindowsPath
 
 from rift_cl.errors import FileFormatError, InputError, PathEscapeError, RiftError
 
+# Folders of masks beside the photographs, or beside their folder.
+MASK_FOLDERS = ("masks", "mask")
+_MASK_SUFFIXES = (".png", ".jpg", ".jpeg", ".tif", ".tiff")
 # NeRF's synthetic captures leave the extension out; all of them are PNG.
 _SUFFIXES = ("", ".png", ".jpg", ".jpeg", ".exr", ".tif", ".tiff", ".hdr")
 
@@ -114,7 +117,8 @@ def mask_of(where: str, images: CaptureFolder, name: str) -> Path | None:
     """The mask of a photograph, found by its name; None where there is none.
 
     Looked for, in this order, are ``masks/NAME.EXT.png`` as COLMAP calls it, ``masks/NAME.png``,
-    both beside the folder ``images``, and ``NAME_mask.png`` beside the photograph.
+    the same as ``.jpg``, ``.jpeg``, ``.tif`` and ``.tiff``, all of these in ``mask``, both beside
+    the folder ``images``, and ``NAME_mask.png`` beside the photograph.
 
     Args:
         where: the place that names the photograph, for errors.
@@ -124,11 +128,23 @@ def mask_of(where: str, images: CaptureFolder, name: str) -> Path | None:
     Raises:
         PathEscapeError: it is a link that leads out of the capture.
     """
+    names = masks_named(name)
+    for folder in MASK_FOLDERS:
+        # Most captures have none, and a look for each of the names takes time.
+        if (images.root / folder).is_dir():
+            found = CaptureFolder(images.root, folder).optional(where, *names)
+            if found is not None:
+                return found
+    return images.optional(where, mask_beside(name.replace("\\", "/")))
+
+
+def masks_named(name: str) -> tuple[str, ...]:
+    """What the mask of a photograph may be called in a folder of masks, likeliest first."""
     plain = Path(name.replace("\\", "/"))
     inner = Path(*plain.parts[1:]) if plain.parts[0] == "images" else plain
-    names = (f"{inner}.png", str(inner.with_suffix(".png")))
-    found = CaptureFolder(images.root, "masks").optional(where, *names)
-    return found or images.optional(where, mask_beside(str(plain)))
+    return tuple(
+        f"{start}{suffix}" for suffix in _MASK_SUFFIXES for start in (inner, inner.with_suffix(""))
+    )
 
 
 def _short(name: str) -> str:

@@ -6,6 +6,7 @@ so that nothing has to be turned round.
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 from types import ModuleType
@@ -13,10 +14,12 @@ from types import ModuleType
 import numpy as np
 from numpy.typing import NDArray
 
-from rift_cl.errors import FileFormatError
+from rift_cl.errors import FileFormatError, RiftError
 from rift_cl.geometry.camera import Camera
 from rift_cl.geometry.lens_distortion import lens_of
+from rift_cl.io.boundary import reading
 from rift_cl.io.captures import colmap_binary, colmap_text
+from rift_cl.io.captures.capture_notes import mask_notes, pose_notes
 from rift_cl.io.captures.capture_paths import CaptureFolder, mask_of
 from rift_cl.io.captures.colmap_records import CameraRecord, ImageRecord
 from rift_cl.io.captures.pose_record import is_upright
@@ -64,7 +67,37 @@ def open_model(
         views = [replace(view, upright=True) for view in views]
     checked = check_views(path, views)
     points, colors, error = _points(model / f"points3D{suffix}", reader)
-    return Capture(checked, points, colors, model, error)
+    notes = mask_notes(images, checked)
+    # Of poses that we had found ourselves, this was said then.
+    if photographs and not is_upright(model):
+        notes += [f"{note}{_others_in_words(model)}" for note in pose_notes(images, checked)]
+    return Capture(checked, points, colors, model, error, tuple(notes))
+
+
+def _others_in_words(model: Path) -> str:
+    """What other models there are, as the end of a sentence; empty where there are none."""
+    counts = ", ".join(f"{name} has {count}" for name, count in _other_models(model).items())
+    return f"; {counts}: give that folder as the capture to use it instead" if counts else ""
+
+
+def _other_models(model: Path) -> dict[str, int]:
+    """Models beside one that COLMAP numbered, by their folders: how many photographs each has.
+
+    COLMAP makes one of each part of the photographs that hangs together.
+    """
+    counts: dict[str, int] = {}
+    if not model.name.isdecimal():
+        return counts
+    with reading(model.parent, "the folder"):
+        folders = sorted(model.parent.iterdir())
+    for folder in folders:
+        other = find_model(folder) if folder.name.isdecimal() and folder != model else None
+        # Damage in what is not asked for is no matter.
+        if other is not None and other[0] == folder:
+            with suppress(RiftError):
+                images = _READERS[other[1]].read_images(folder / f"images{other[1]}")
+                counts[f"{folder.parent.name}/{folder.name}"] = len(images)
+    return counts
 
 
 def _images_folder(folder: Path) -> CaptureFolder:

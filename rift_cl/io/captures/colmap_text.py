@@ -1,4 +1,9 @@
-"""The text files of a COLMAP model: a record on a line, an image on two."""
+"""The text files of a COLMAP model: a record on a line, an image on two.
+
+The second line of an image holds the features found in it, and is empty where there are none. Many
+scripts leave it out altogether, so that the two are told apart by what they hold: an image ends in
+its name, features in a number.
+"""
 
 from __future__ import annotations
 
@@ -22,6 +27,8 @@ _Number = TypeVar("_Number", int, float)
 # What an image's line holds before its name, and a point's before its track.
 _BEFORE_NAME = 9
 _BEFORE_TRACK = 8
+# Numbers of a feature.
+_FEATURE = 3
 # Words in the line of a camera; no model has more.
 _LONGEST_CAMERA = 32
 
@@ -57,7 +64,12 @@ def read_images(path: Path) -> list[ImageRecord]:
     """
     images = []
     with _opened(path) as file:
-        for where, line in _records(path, file, lines=2):
+        after_image = False
+        for where, line in _records(path, file):
+            if after_image and _holds_features(where, line):
+                after_image = False
+                continue
+            after_image = True
             words = _words(where, line, _BEFORE_NAME + 1, _BEFORE_NAME + 1)
             values = tuple(_numbers(where, float, words[1:8]))
             (camera,) = _numbers(where, int, words[8:9])
@@ -93,14 +105,37 @@ def _opened(path: Path) -> Iterator[TextIO]:
         yield file
 
 
-def _records(path: Path, file: TextIO, lines: int = 1) -> Iterator[tuple[str, str]]:
-    """The first line of each record, and its place; a record's other lines may be empty."""
-    numbered = enumerate(file, 1)
-    for number, line in numbered:
+def _records(path: Path, file: TextIO) -> Iterator[tuple[str, str]]:
+    """The lines that hold something, and their places."""
+    for number, line in enumerate(file, 1):
         if line.strip() and not line.lstrip().startswith("#"):
             yield f"{path}: line {number}", line
-            for _ in range(lines - 1):
-                next(numbered, None)
+
+
+def _holds_features(where: str, line: str) -> bool:
+    """Whether the line after an image holds its features: x, y and the point's number of each.
+
+    Raises:
+        FileFormatError: it is neither that nor the line of another image.
+    """
+    words = line.split()
+    # Without an extension the name of an image may be a number as well.
+    if len(words) == _BEFORE_NAME + 1 or not _is_number(words[-1]):
+        return False
+    if len(words) % _FEATURE:
+        raise FileFormatError(
+            f"{where}: has {len(words)} entries, wanted the features of the image above, x, y and "
+            "the number of the point of each, or another image, which ends in its name"
+        )
+    return True
+
+
+def _is_number(word: str) -> bool:
+    try:
+        float(word)
+    except ValueError:
+        return False
+    return True
 
 
 def _words(where: str, line: str, least: int, most: int) -> list[str]:

@@ -53,8 +53,8 @@ class Photograph:
     def plain(self) -> bool:
         """Any program reads the same 8-bit colours from it."""
         header = self.header
-        kind = header.eight_bit and not header.alpha and self.path.suffix.lower() in _PLAIN
-        return kind and header.orientation == 1
+        kind = header.eight_bit and not (header.alpha or header.linear)
+        return kind and header.orientation == 1 and self.path.suffix.lower() in _PLAIN
 
     @property
     def camera(self) -> tuple[object, ...]:

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import math
 import reprlib
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -17,6 +18,7 @@ from rift_cl.errors import FileFormatError, InputError
 from rift_cl.geometry.aperture import Aperture
 from rift_cl.geometry.camera import Camera
 from rift_cl.geometry.lens_distortion import LENS_MODELS, lens_of
+from rift_cl.io.captures.capture_notes import mask_notes
 from rift_cl.io.captures.capture_paths import CaptureFolder, mask_of
 from rift_cl.io.captures.point_cloud import read_point_cloud
 from rift_cl.io.captures.poses import view_of_opengl
@@ -26,6 +28,12 @@ from rift_cl.io.json_fields import Fields, read_json_object
 
 _COEFFICIENTS = tuple(dict.fromkeys(name for names in LENS_MODELS.values() for name in names))
 _MODELS = ("SIMPLE_PINHOLE", "PINHOLE", *LENS_MODELS)
+# nerfstudio's lists of what is trained on and scored.
+_SPLITS = ("train_filenames", "val_filenames", "test_filenames")
+_ALONG = {"w": "wide", "h": "high"}
+# A principal point this share of the picture from its middle is doubted: that of a picture half as
+# large lies at a quarter, those that calibrations find within a tenth.
+_DOUBTED = 0.2
 
 
 def open_transforms(
@@ -46,11 +54,46 @@ def open_transforms(
     by_name = all(frame.values.get("mask_path") is None for frame in frames)
     views = [_view(place, frame, top, by_name) for frame in frames]
     checked = check_views(path, views)
+    notes = (
+        *(mask_notes(place, checked) if by_name else []),
+        *_split_notes(top),
+        *_center_notes(path, checked),
+    )
     ply = top.text("ply_file_path")
     if ply is None:
-        return Capture(checked, None, None, path)
+        return Capture(checked, None, None, path, notes=notes)
     points, colors = read_point_cloud(folder.file(f"{path}: 'ply_file_path'", ply))
-    return Capture(checked, points, colors, path)
+    return Capture(checked, points, colors, path, notes=notes)
+
+
+def _split_notes(top: Fields) -> list[str]:
+    named = [name for name in _SPLITS if name in top]
+    if not named:
+        return []
+    return [
+        f"{top.where}: {', '.join(map(repr, named))} are not followed; --hold-out says which "
+        "photographs are held out, and --test names another capture to score"
+    ]
+
+
+def _center_notes(path: Path, views: Sequence[View]) -> list[str]:
+    """A principal point far from the middle: right in a crop, and wrong after a change of size."""
+    far = [view for view in views if _off_middle(view.camera) > _DOUBTED]
+    if not far:
+        return []
+    camera = far[0].camera
+    _, _, cx, cy = camera.intrinsics
+    return [
+        f"{path}: the principal point of {len(far)} of {len(views)} photographs is far from the "
+        f"middle, such as ({cx:g}, {cy:g}) in the {camera.width} x {camera.height} pixels of "
+        f"{far[0].name}: unless these are crops, the intrinsics are those of another size"
+    ]
+
+
+def _off_middle(camera: Camera) -> float:
+    """How far the principal point is from the middle, as a share of the picture."""
+    _, _, cx, cy = camera.intrinsics
+    return max(abs(cx / camera.width - 0.5), abs(cy / camera.height - 0.5))
 
 
 def _view(folder: CaptureFolder, frame: Fields, top: Fields, by_name: bool) -> View:
@@ -96,9 +139,23 @@ def _intrinsics(own: Fields, fields: Fields, size: tuple[int, int]) -> list[list
         raise FileFormatError(
             f"{fields.where}: has neither 'fl_x' nor 'camera_angle_x', the focal length is wanted"
         )
-    cx, cy = fields.number("cx"), fields.number("cy")
-    center = (size[1] / 2 if cx is None else cx, size[0] / 2 if cy is None else cy)
-    return [[fx, 0, center[0]], [0, fx if fy is None else fy, center[1]], [0, 0, 1]]
+    cx, cy = _center(fields, "cx", "w", size[1]), _center(fields, "cy", "h", size[0])
+    return [[fx, 0, cx], [0, fx if fy is None else fy, cy], [0, 0, 1]]
+
+
+def _center(fields: Fields, name: str, edge: str, extent: int) -> float:
+    """Principal point along an edge in pixels; the middle where nothing is said."""
+    center = fields.number(name)
+    if center is None:
+        return extent / 2
+    if edge not in fields and not 0 < center < extent:
+        raise InputError(
+            f"{fields.where}: {name!r} is {center:g}, outside of the picture, which is {extent} "
+            f"pixels {_ALONG[edge]}: the intrinsics are probably those of pictures of another "
+            "size. Scale 'fl_x', 'fl_y', 'cx' and 'cy' to this one; if they belong to it, say so "
+            "in 'w' and 'h'"
+        )
+    return center
 
 
 def _focal(own: Fields, fields: Fields, axis: str, extent: int) -> float | None:

@@ -49,6 +49,7 @@ class Capture:
         path: the file, or the folder of the COLMAP model, that the views were found in.
         reprojection_error: how far from where a photograph shows them the sparse points are
             seen, in pixels of the photographs, the mean over the points; None where nobody says.
+        notes: what of the capture is not used, or may not be meant, a sentence each.
     """
 
     views: tuple[View, ...]
@@ -56,6 +57,7 @@ class Capture:
     point_colors: NDArray[np.float32] | None
     path: Path
     reprojection_error: float | None = None
+    notes: tuple[str, ...] = ()
 
     def __repr__(self) -> str:
         first, others = self.views[0].camera, self.views[1:]

@@ -34,6 +34,8 @@ _SHOWN = {
     7: (-1, True),
     8: (1, False),
 }
+# Suffixes of formats that do not keep every code, and what is white in a mask of such.
+_LOSSY, _HALF = (".jpg", ".jpeg"), 0.5
 # The code 1 of 8 bits, with room for rounding.
 _ONE_CODE = 1.01 / 255
 
@@ -54,7 +56,8 @@ def read_view(
         view: one of the views of a capture.
         downscale: whole factor to make the image smaller by; areas are averaged.
         light: "display" for sRGB codes in [0, 1], "linear" for numbers proportional to light.
-            OpenEXR, HDR and floating TIFF count as linear on disk, everything else as display.
+            OpenEXR, HDR, floating TIFF and PNG of gamma 1 count as linear on disk, everything else
+            as display.
         budget: bytes that the reading may take; 60 % of the free memory when not given.
 
     Returns:
@@ -162,21 +165,45 @@ def read_photograph(path: Path, header: PictureHeader, budget: int | None) -> Im
 
 
 def _coverage(path: Path, budget: int | None) -> Image:
-    """A mask (y, x): how much of each pixel counts, from 0 to 1."""
+    """A mask (y, x): how much of each pixel counts, from 0 to 1.
+
+    Where alpha varies and colours do not, alpha is the mask; else their product is.
+
+    Raises:
+        FileFormatError: the file is damaged, or nothing in it tells what counts.
+        NonFiniteError: it holds NaN or infinity.
+    """
     header = read_picture_header(path)
     codes = read_pixels(path, budget=budget)
     if not np.isfinite(codes).all():
         raise NonFiniteError(f"{path}: the mask holds NaN or infinity")
-    if not header.linear and 0 < codes.max() <= _ONE_CODE:
+    colors = codes[..., :-1] if header.alpha else codes
+    if not header.floating and 0 < colors.max() <= _ONE_CODE:
         raise FileFormatError(
             f"{path}: the mask has no code above 1, so that all of it is black; write 255 where "
             "the photograph counts"
         )
-    colors = codes[..., :-1] if header.alpha else codes
     mask: Image = colors.mean(axis=-1, dtype=np.float32)
     if header.alpha:
-        mask *= codes[..., -1]
+        mask = _with_own_alpha(path, mask, codes[..., -1])
+    if path.suffix.lower() in _LOSSY:
+        # Black and white come back as greys wherever an edge is near.
+        return (mask > _HALF).astype(np.float32)
     return np.clip(mask, 0, 1)
+
+
+def _with_own_alpha(path: Path, mask: Image, alpha: Image) -> Image:
+    """A mask that has alpha; see ``_coverage``."""
+    if np.ptp(mask):
+        return mask * alpha
+    if np.ptp(alpha):
+        return alpha
+    if not mask.any():
+        raise FileFormatError(
+            f"{path}: the mask is black in all of its colours and has one alpha, so that nothing "
+            "tells what counts; write it without alpha, white where the photograph counts"
+        )
+    return mask * alpha
 
 
 def _with_alpha(image: Image) -> Image:

@@ -7,6 +7,7 @@ and columns are upright already; what EXIF says besides about the orientation do
 
 from __future__ import annotations
 
+import io
 import struct
 import warnings
 from collections.abc import Iterator
@@ -24,6 +25,10 @@ from rift_cl.errors import FileFormatError, InputError
 BRANDS = (b"heic", b"heix", b"heim", b"heis", b"mif1")
 # EXIF's numbers of the maker, the model, its own folder of facts, and the focal lengths in there.
 _MAKE, _MODEL, _EXIF, _FOCALS = 271, 272, 0x8769, (0x920A, 0xA405)
+# What a colour profile is called that has no name.
+UNNAMED = "without a name"
+# Primaries other than sRGB's by their number (ITU-T H.273), where there is no ICC profile.
+_PRIMARIES = {9: "Rec. 2020", 12: "Display P3"}
 # Bytes of boxes that are looked at; a phone's take a few thousand.
 _MOST_BOXES = 16 << 20
 # Bytes before the boxes in these boxes, by the version of those that have several.
@@ -74,6 +79,21 @@ def heic_taken_by(picture: Any) -> tuple[str, ...]:
         more = facts.get_ifd(_EXIF)
         values = [*(facts.get(number) for number in (_MAKE, _MODEL)), *map(more.get, _FOCALS)]
     return tuple(str(value) for value in values if value is not None)
+
+
+def heic_profile(picture: Any) -> str:
+    """The name of a picture's colour profile; empty where it has none."""
+    profile = picture.info.get("icc_profile")
+    if not profile:
+        numbers = picture.info.get("nclx_profile") or {}
+        return _PRIMARIES.get(numbers.get("color_primaries", 0), "")
+    name = ""
+    # Pixels do not hang on the profile either.
+    with suppress(Exception):
+        from PIL.ImageCms import ImageCmsProfile, getProfileDescription
+
+        name = getProfileDescription(ImageCmsProfile(io.BytesIO(profile))).strip()
+    return name or UNNAMED
 
 
 def heic_codes(picture: Any) -> NDArray[np.uint8]:

@@ -42,8 +42,9 @@ def write_png(path: str | os.PathLike[str], image: ArrayLike) -> None:
 def read_image(path: str | os.PathLike[str], *, budget: int | None = None) -> NDArray[np.float32]:
     """Read an image as it is stored: (y, x) where there is one channel, else (y, x, channel).
 
-    Integer codes are scaled to [0, 1] and stay in display light; the numbers of OpenEXR, HDR and
-    floating TIFF are returned as they are, which is linear light by custom. Alpha is straight:
+    Integer codes are scaled to [0, 1] and stay in the light that they are stored in, display light
+    by custom; the numbers of OpenEXR, HDR and floating TIFF are returned as they are, which is
+    linear light by custom. Colour profiles are not applied. Alpha is straight:
     where a file holds colours with alpha multiplied in, as OpenEXR does, they are divided by it.
     Rows and columns are those of the file, whatever EXIF says about its orientation.
 

@@ -4,11 +4,16 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from rift_cl.io.boundary import reading
-from rift_cl.io.images.heic import heic_taken_by, opened_heic
+from rift_cl.io.images.heic import UNNAMED, heic_profile, heic_taken_by, opened_heic
 from rift_cl.io.images.pixels import HEIC, image_format, opened_image
 
+# Beginnings of OpenImageIO's names for the curve and the primaries of sRGB, or nearly them.
+_SRGB = ("srgb_rec709", "g22_rec709", "gamma2.2")
+# What Facebook calls the small profile of sRGB in its photographs.
+_SMALL_SRGB = "c2"
 _TAKEN_BY = ("Make", "Model", "Exif:FocalLength", "Exif:FocalLengthIn35mmFilm")
 
 
@@ -20,21 +25,27 @@ class PictureHeader:
         size: (height, width) in pixels.
         channels: numbers in a pixel.
         alpha: the last of them is alpha.
-        linear: the colours are proportional to light; integers are display light by custom.
+        linear: the colours are proportional to light; integers are display light by custom, unless
+            the file says that their gamma is 1.
+        floating: the numbers are real ones, not codes.
         eight_bit: each number is a code of 8 bits.
         orientation: how EXIF wants it shown: 1 as it is stored, 3 turned by half, 2 and 4 mirrored,
             5 to 8 with the axes swapped. HEIC comes turned from its decoder, and is 1 here.
         taken_by: maker and model of the camera and its focal lengths, as EXIF has them; empty
             where it has none.
+        profile: the name of the colour profile or colour space that the file says codes are in;
+            empty where that is sRGB's or linear light, or nothing is said.
     """
 
     size: tuple[int, int]
     channels: int
     alpha: bool
     linear: bool
+    floating: bool
     eight_bit: bool
     orientation: int
     taken_by: tuple[str, ...]
+    profile: str
 
     @property
     def sideways(self) -> bool:
@@ -66,9 +77,11 @@ def _heic_header(path: Path) -> PictureHeader:
         channels=len(picture.mode),
         alpha=picture.mode.endswith("A"),
         linear=False,
+        floating=False,
         eight_bit=True,
         orientation=1,
         taken_by=heic_taken_by(picture),
+        profile=_unlike_srgb(heic_profile(picture)),
     )
 
 
@@ -77,12 +90,34 @@ def _header(path: Path, format: str) -> PictureHeader:
         spec = source.spec()
         orientation = int(spec.get_int_attribute("Orientation", 1))
         taken_by = (spec.getattribute(name) for name in _TAKEN_BY)
+        floating = str(spec.format) in ("half", "float", "double")
+        space = spec.get_string_attribute("oiio:ColorSpace").lower()
         return PictureHeader(
             size=(int(spec.height), int(spec.width)),
             channels=int(spec.nchannels),
             alpha=spec.alpha_channel >= 0,
-            linear=str(spec.format) in ("half", "float", "double"),
+            linear=floating or space.startswith("lin"),
+            floating=floating,
             eight_bit=str(spec.format) == "uint8",
             orientation=orientation if 1 <= orientation <= 8 else 1,
             taken_by=tuple(str(value) for value in taken_by if value is not None),
+            profile="" if floating else _profile(spec, space),
         )
+
+
+def _profile(spec: Any, space: str) -> str:
+    """The profile of codes, or else their colour space, where that is neither sRGB nor linear."""
+    if spec.getattribute("ICCProfile") is not None:
+        name = spec.get_string_attribute("ICCProfile:profile_description")
+        return _unlike_srgb(name or UNNAMED)
+    if space in ("", "srgb") or space.startswith(("lin", *_SRGB)):
+        return ""
+    gamma = spec.get_float_attribute("oiio:Gamma", 0.0)
+    return f"gamma {gamma:.3g}" if gamma else space
+
+
+def _unlike_srgb(name: str) -> str:
+    """The name of a profile; empty where it is sRGB's."""
+    plain = name.lower()
+    alike = plain == _SMALL_SRGB or ("srgb" in plain and "linear" not in plain)
+    return "" if alike else name

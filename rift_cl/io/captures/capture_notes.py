@@ -1,0 +1,85 @@
+"""What is said of the photographs of a capture once its views are known, a sentence each.
+
+None of it makes a capture unusable, and all of it may be meant: masks that no photograph has,
+photographs without a pose, colours that are not sRGB's.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from contextlib import suppress
+from pathlib import Path
+
+from rift_cl.errors import RiftError
+from rift_cl.io.captures.capture_paths import MASK_FOLDERS, CaptureFolder, masks_named
+from rift_cl.io.captures.photograph_folder import photograph_names
+from rift_cl.io.captures.view import View
+from rift_cl.io.images.picture_header import PictureHeader, read_picture_header
+
+# Photographs whose headers are read for their colours.
+_LOOKED_AT = 8
+
+
+def pose_notes(images: CaptureFolder, views: Sequence[View]) -> list[str]:
+    """How many photographs have a pose, unless all have one.
+
+    Args:
+        images: the folder of the photographs.
+        views: those that have a pose; what lies in their folders counts.
+    """
+    posed = {view.image for view in views}
+    found = {
+        place / name
+        for place in {image.parent for image in posed}
+        for name in photograph_names(CaptureFolder(place))
+    }
+    if found <= posed:
+        return []
+    return [f"{len(posed)} of {len(found | posed)} photographs in {images.path} have a pose"]
+
+
+def mask_notes(images: CaptureFolder, views: Sequence[View]) -> list[str]:
+    """Which photographs have no mask, although there is a folder of masks.
+
+    Args:
+        images: the folder of the photographs.
+        views: all of them, with the masks that were found by name.
+    """
+    folders = (images.root / name for name in MASK_FOLDERS)
+    folder = next((folder for folder in folders if folder.is_dir()), None)
+    bare = [view.name for view in views if view.mask is None]
+    if folder is None or not bare:
+        return []
+    if len(bare) == len(views):
+        wanted = " or ".join(masks_named(bare[0])[:2])
+        return [
+            f"{folder} holds no mask that is called as a photograph is, and is not used: that of "
+            f"{bare[0]} would be {wanted} there"
+        ]
+    return [
+        f"{len(bare)} of {len(views)} photographs, such as {bare[0]}, have no mask in {folder}: "
+        "the whole of each is used"
+    ]
+
+
+def color_notes(views: Sequence[View]) -> list[str]:
+    """What is made of colours that are not sRGB's, by the headers of a few photographs."""
+    notes: dict[str, str] = {}
+    for view in views[:: max(1, len(views) // _LOOKED_AT)]:
+        # Whoever reads the photograph is told what is wrong with it.
+        with suppress(RiftError):
+            header = read_picture_header(view.image)
+            if sentence := _color_sentence(view.image, header):
+                notes.setdefault(header.profile, sentence)
+    return list(notes.values())
+
+
+def _color_sentence(path: Path, header: PictureHeader) -> str:
+    if header.profile:
+        return (
+            f"{path.name} has the colour profile {header.profile!r}, which is not applied: colours "
+            "are taken as sRGB"
+        )
+    if header.linear and not header.floating:
+        return f"{path.name} says that its codes are linear light (gamma 1), and is read so"
+    return ""

@@ -1,0 +1,160 @@
+"""What of a capture is not used, or may not be meant, is said in its notes and refused nowhere."""
+
+from __future__ import annotations
+
+import json
+import zlib
+from pathlib import Path
+
+import capture_files as made
+import numpy as np
+import pytest
+from PIL import Image, ImageCms
+from view_files import store
+
+from rift_cl.io import open_capture
+from rift_cl.io.images.picture_header import read_picture_header
+
+
+def note(path: Path) -> str:
+    """The one note of a capture."""
+    (found,) = open_capture(path).notes
+    return found
+
+
+def two_models(folder: Path) -> Path:
+    """Three photographs with poses in sparse/0, and a fourth in sparse/1 alone."""
+    made.photographs(folder / "images", [*made.NAMES, "d.png"])
+    made.colmap_text(folder / "sparse" / "0")
+    other = made.colmap_text(folder / "sparse" / "1")
+    lines = (other / "images.txt").read_text().splitlines()
+    (other / "images.txt").write_text("\n".join(lines[:4]).replace("a.png", "d.png"))
+    return folder
+
+
+def test_an_ordinary_capture_has_no_notes(tmp_path: Path) -> None:
+    assert open_capture(made.transforms(tmp_path / "a")).notes == ()
+    made.photographs(tmp_path / "b" / "images")
+    made.colmap_binary(tmp_path / "b" / "sparse" / "0")
+    assert open_capture(tmp_path / "b").notes == ()
+
+
+def test_photographs_without_a_pose_and_other_models_are_counted(tmp_path: Path) -> None:
+    found = note(two_models(tmp_path))
+    assert found.startswith(f"3 of 4 photographs in {tmp_path / 'images'} have a pose")
+    assert "sparse/1 has 1" in found
+    other = note(tmp_path / "sparse" / "1")
+    # The folder of c.png has no photograph with a pose, and is not looked into.
+    assert "1 of 3 photographs" in other and "sparse/0 has 3" in other
+    assert open_capture(tmp_path, photographs=False).notes == ()
+
+
+def test_a_damaged_model_that_is_not_asked_for_does_not_matter(tmp_path: Path) -> None:
+    (two_models(tmp_path) / "sparse" / "1" / "images.txt").write_text("1 2 3")
+    assert note(tmp_path).endswith("have a pose")
+
+
+def test_our_own_poses_were_told_of_when_they_were_found(tmp_path: Path) -> None:
+    (two_models(tmp_path) / "sparse" / "0" / "poses.json").write_text('{"upright": true}')
+    assert open_capture(tmp_path).notes == ()
+
+
+@pytest.mark.parametrize("folder", ["masks", "mask"])
+def test_masks_that_fit_no_photograph_or_some(tmp_path: Path, folder: str) -> None:
+    path = made.transforms(tmp_path)
+    made.photographs(tmp_path / folder, ["mask_0001.png"])
+    assert str(tmp_path / folder) in note(path) and "sub/c.png" not in note(path)
+    made.photographs(tmp_path / folder, ["a.png", "b.png.png"])
+    assert "1 of 3 photographs, such as images/sub/c.png" in note(path)
+    made.photographs(tmp_path / folder)
+    assert open_capture(path).notes == ()
+
+
+def test_where_masks_are_named_the_folder_says_nothing(tmp_path: Path) -> None:
+    path = made.transforms(tmp_path)
+    made.photographs(tmp_path / "masks", ["x.png"])
+    made.changed(path, 1, mask_path="masks/x.png")
+    assert open_capture(path).notes == ()
+
+
+def test_lists_of_what_is_trained_on_are_not_followed(tmp_path: Path) -> None:
+    path = made.transforms(tmp_path, train_filenames=["images/a.png"], test_filenames=[])
+    found = note(path)
+    assert "'train_filenames', 'test_filenames'" in found and "'val_filenames'" not in found
+    assert "--hold-out" in found and "--test" in found
+
+
+@pytest.mark.parametrize(("cx", "doubted"), [(6.0, False), (4.0, False), (3.0, True), (9.0, True)])
+def test_a_principal_point_far_from_the_middle_is_doubted(
+    tmp_path: Path, cx: float, doubted: bool
+) -> None:
+    """That of pictures half as large lies at a quarter of the width, which is 12."""
+    path = made.changed(made.transforms(tmp_path), 1, cx=cx)
+    found = open_capture(path).notes
+    assert bool(found) == doubted
+    assert not doubted or f"1 of 3 photographs is far from the middle, such as ({cx:g}," in found[0]
+
+
+def with_profile(path: Path, name: str, kind: str = "sRGB") -> Path:
+    """A picture with a profile of this name; all of Pillow's are as long as 'sRGB built-in'."""
+    profile = ImageCms.ImageCmsProfile(ImageCms.createProfile(kind)).tobytes()
+    old = "sRGB built-in".encode("utf-16-be")
+    new = name.ljust(13, "\0").encode("utf-16-be")
+    assert profile.count(old) == 1 and len(new) == len(old)
+    Image.new("RGB", (made.WIDTH, made.HEIGHT)).save(path, icc_profile=profile.replace(old, new))
+    return path
+
+
+@pytest.mark.parametrize("suffix", ["png", "jpg", "tif"])
+def test_colour_profiles_but_those_of_srgb_are_named(tmp_path: Path, suffix: str) -> None:
+    for name in ("sRGB built-in", "My sRGB"):
+        assert read_picture_header(with_profile(tmp_path / f"a.{suffix}", name)).profile == ""
+    for name in ("Display P3", "linear sRGB"):
+        assert read_picture_header(with_profile(tmp_path / f"a.{suffix}", name)).profile == name
+
+
+def test_a_capture_tells_of_a_colour_profile_once(tmp_path: Path) -> None:
+    path = made.transforms(tmp_path)
+    for name in made.NAMES:
+        with_profile(tmp_path / "images" / name, "Display P3")
+    found = note(path)
+    assert found.startswith("a.png ") and "'Display P3'" in found and "sRGB" in found
+    assert open_capture(path, photographs=False).notes == ()
+
+
+def with_chunk(path: Path, kind: bytes, content: bytes) -> Path:
+    """A PNG with a chunk before its pixels, where there was none that tells of colours."""
+    image = Image.new("RGB", (made.WIDTH, made.HEIGHT))
+    image.save(path)
+    start, pixels = path.read_bytes().split(b"IDAT")
+    check = zlib.crc32(kind + content).to_bytes(4, "big")
+    chunk = len(content).to_bytes(4, "big") + kind + content + check
+    path.write_bytes(start[:-4] + chunk + start[-4:] + b"IDAT" + pixels)
+    return path
+
+
+@pytest.mark.parametrize(
+    ("kind", "content", "linear", "profile"),
+    [
+        (b"gAMA", (45455).to_bytes(4, "big"), False, ""),
+        (b"gAMA", (55556).to_bytes(4, "big"), False, "gamma 1.8"),
+        (b"gAMA", (100000).to_bytes(4, "big"), True, ""),
+        (b"sRGB", b"\0", False, ""),
+    ],
+)
+def test_the_gamma_of_a_png(
+    tmp_path: Path, kind: bytes, content: bytes, linear: bool, profile: str
+) -> None:
+    header = read_picture_header(with_chunk(tmp_path / "a.png", kind, content))
+    assert (header.linear, header.profile, header.floating) == (linear, profile, False)
+
+
+def test_codes_that_are_linear_light_are_told_of(tmp_path: Path) -> None:
+    path = made.transforms(tmp_path)
+    pixels = np.zeros((made.HEIGHT, made.WIDTH, 3), np.float32)
+    store(tmp_path / "images" / "a.png", pixels, "uint16", **{"oiio:ColorSpace": "linear"})
+    assert note(path).startswith("a.png ") and "linear light" in note(path)
+    value = json.loads(path.read_text().replace("a.png", "a.exr"))
+    path.write_text(json.dumps(value))
+    store(tmp_path / "images" / "a.exr", pixels, "float")
+    assert open_capture(path).notes == ()
