@@ -30,6 +30,11 @@ _JITTER, _FILLS = 0.1, 0.5
 _ROUND_BEYOND = 4 * np.pi
 _ROUND_STEP = 0.25
 _FEWEST_ROUND = 8
+# Of steps beyond a turn in radians, which no scan has, fewer tell as much.
+_FEWEST_COARSE = 4
+# The golden angle in degrees, of a turn and of half a turn, and how near to it steps are.
+_GOLDEN_IN_DEGREES = (180 * (3 - 5**0.5), 90 * (5**0.5 - 1))
+_NEAR_GOLDEN = 0.01
 
 # Arrays of so many numbers are told in full.
 _FEW_NUMBERS = 4
@@ -176,10 +181,11 @@ def checked_angles(owner: str, angles: ArrayLike, *, helix: bool = False) -> NDA
 def _refuse_degrees(owner: str, angles: NDArray[np.float64], *, helix: bool) -> None:
     """Refuse angles that are degrees by all appearance.
 
-    Even steps that fill half a turn, a turn or two in degrees, or eight and more steps that do so
-    nearly, as an encoder reads them; and eight and more angles that would
-    fill more than two turns as radians, and are multiples of a quarter or lead in even steps from
-    one whole number to another. A helix has many turns: of it, only the first is refused.
+    Even steps that fill half a turn, a turn or two in degrees or are the golden angle, or eight and
+    more steps that fill these turns nearly, as an encoder reads them; and eight and more angles
+    that would fill more than two turns as radians, and are multiples of a quarter or lead in even
+    steps from one whole number to another, or from minus a half of one to the half; four, if a step
+    is beyond a turn. A helix has many turns: of it, only the first is refused.
 
     Raises:
         InputError: they do; the message names the remedy.
@@ -193,6 +199,8 @@ def _refuse_degrees(owner: str, angles: NDArray[np.float64], *, helix: bool) -> 
     for turn in _TURNS_IN_DEGREES if even else ():
         if any(abs(whole - turn) < _TURN_TOLERANCE * turn for whole in wholes):
             _refuse(owner, f"fill {turn:g} in even steps")
+    if any(_goes_by(steps, golden) for golden in _GOLDEN_IN_DEGREES):
+        _refuse(owner, f"go on by the golden angle, {steps[0]:g}")
     step = float(steps.mean())
     # Steps that are even to rounding were computed, and may be radians of many turns.
     if (
@@ -203,10 +211,19 @@ def _refuse_degrees(owner: str, angles: NDArray[np.float64], *, helix: bool) -> 
         for turn in _TURNS_IN_DEGREES:
             if any(abs(whole - turn) <= _FILLS * abs(step) for whole in wholes):
                 _refuse(owner, f"fill {turn:g} in nearly even steps")
-    if helix or len(angles) < _FEWEST_ROUND or span <= _ROUND_BEYOND:
+    fewest = _FEWEST_COARSE if even and abs(step) > 2 * np.pi else _FEWEST_ROUND
+    if helix or len(angles) < fewest or span <= _ROUND_BEYOND:
         return
-    if _are_round(angles, _ROUND_STEP) or (even and _are_round(angles[[0, -1]], 1.0)):
+    ends = angles[[0, -1]]
+    whole = 0.5 if ends.sum() == 0 else 1.0
+    if _are_round(angles, _ROUND_STEP) or (even and _are_round(ends, whole)):
         _refuse(owner, f"go in round numbers from {angles.min():g} to {angles.max():g}")
+
+
+def _goes_by(steps: NDArray[np.float64], degrees: float) -> bool:
+    """Whether all steps, but for half turns, are so many degrees, in either sense."""
+    away = [np.mod(sense * steps - degrees + 90, 180) - 90 for sense in (1, -1)]
+    return any(bool((np.abs(each) < _NEAR_GOLDEN).all()) for each in away)
 
 
 def _are_round(values: NDArray[np.float64], step: float) -> bool:

@@ -22,6 +22,7 @@ from numpy.typing import ArrayLike, NDArray
 from rift_cl.cl.host_arrays import as_host_array, as_real_array
 from rift_cl.errors import DTypeError, InputError, ShapeError
 from rift_cl.geometry import Cone, Fan, Grid, Parallel
+from rift_cl.geometry.length_units import length_unit
 from rift_cl.geometry.numbers import one_number
 from rift_cl.interop.optional_package import optional_package
 
@@ -30,7 +31,19 @@ __all__ = ["from_xarray", "to_xarray"]
 Floats = NDArray[np.float32]
 Labelled = Grid | Parallel | Fan | Cone
 _KIND, _STEP = "scan", "spacing"
-_DEGREES = ("deg", "degree", "degrees", "°")
+# Units of angles in radians, by the names that CF, UDUNITS and pint have for them; spaces as "_".
+_ANGLES = {
+    **dict.fromkeys(("", "1", "rad", "rads", "radian", "radians"), 1.0),
+    **dict.fromkeys(("mrad", "milliradian", "milliradians"), 1e-3),
+    **dict.fromkeys(
+        (
+            *("deg", "degs", "degree", "degrees", "°", "arcdeg", "arc_degree", "arc_degrees"),
+            *("angle_degree", "angle_degrees", "angular_degree", "angular_degrees"),
+            *("degree_angle", "degrees_angle"),
+        ),
+        np.pi / 180,
+    ),
+}
 # By how much of a step coordinates may stray from even spacing.
 _EVEN = 1e-3
 
@@ -80,9 +93,10 @@ def from_xarray(array: Any) -> tuple[Floats, Labelled]:
 
     Args:
         array: a ``DataArray`` with the dimensions y, x or z, y, x, or with theta and detector and
-            perhaps row, in any order. Coordinates are evenly spaced, those of theta in radians or,
-            as their attribute "units" says, in degrees. Those that fall are turned round. A scan is
-            parallel unless the attribute "scan" is "Fan" or "Cone" and the distances are there.
+            perhaps row, in any order. Coordinates are evenly spaced, all lengths in one unit, those
+            of theta in radians or, as their attribute "units" says, in degrees or milliradians.
+            Those that fall are turned round. A scan is parallel unless the attribute "scan" is
+            "Fan" or "Cone" and the distances are there, in the unit of the coordinates.
 
     Returns:
         The values, float32 in the order of dimensions named here, and the grid or scan.
@@ -90,7 +104,8 @@ def from_xarray(array: Any) -> tuple[Floats, Labelled]:
     Raises:
         DTypeError: it is no ``DataArray`` of real numbers.
         ShapeError: it has other dimensions.
-        InputError: a coordinate is missing or uneven, or a distance is.
+        InputError: a coordinate is missing or uneven, or a distance is; or the coordinates are in
+            several units of length, or theta in no unit of angle.
     """
     if not all(hasattr(array, name) for name in ("dims", "coords", "attrs", "transpose")):
         raise DTypeError(f"array is a {type(array).__name__}, wanted an xarray.DataArray")
@@ -144,15 +159,14 @@ def _scan_labels(
 
 
 def _grid(array: Any, order: list[str]) -> Grid:
+    _check_one_unit(array, order)
     steps = [_step(array, axis) for axis in order]
     middles = [(places[0] + places[-1]) / 2 for places in (_places(array, a) for a in order)]
     return Grid(array.shape, steps, middles)
 
 
 def _scan(array: Any) -> Parallel | Fan | Cone:
-    theta = _places(array, "theta")
-    if str(array.coords["theta"].attrs.get("units", "rad")).strip().lower() in _DEGREES:
-        theta = np.deg2rad(theta)
+    theta = _places(array, "theta") * _angle_unit(array)
     pitch, bins = _step(array, "detector"), array.sizes["detector"]
     center = -_places(array, "detector")[0] / pitch
     kind = array.attrs.get(_KIND, "Parallel")
@@ -166,9 +180,42 @@ def _scan(array: Any) -> Parallel | Fan | Cone:
         return Fan(theta, bins, pitch, near, far, center, curved)
     if "row" not in array.dims:
         raise ShapeError("the attribute scan is Cone, and the array has no dimension row")
+    _check_one_unit(array, ["row", "detector"])
     high = _step(array, "row")
     middle = (-_places(array, "row")[0] / high, center)
     return Cone(theta, array.sizes["row"], bins, (high, pitch), near, far, middle, None, curved)
+
+
+def _unit(array: Any, axis: str) -> str:
+    """The unit that a coordinate says it is in; empty where it says none."""
+    return str(array.coords[axis].attrs.get("units") or "").strip()
+
+
+def _angle_unit(array: Any) -> float:
+    """The unit of theta in radians."""
+    unit = _unit(array, "theta")
+    found = _ANGLES.get("_".join(unit.lower().split()))
+    if found is None:
+        raise InputError(
+            f"the coordinate theta is in {unit!r}, wanted radians, milliradians or degrees: "
+            "convert it with .assign_coords(), and name the unit in its attribute units"
+        )
+    return found
+
+
+def _check_one_unit(array: Any, axes: list[str]) -> None:
+    """Make sure that coordinates which name a unit of length name the same, in whatever words.
+
+    Raises:
+        InputError: they do not.
+    """
+    units = {axis: unit for axis in axes if (unit := _unit(array, axis))}
+    if len({length_unit(unit) or unit for unit in units.values()}) > 1:
+        named = ", ".join(f"{axis} in {unit}" for axis, unit in units.items())
+        raise InputError(
+            f"the coordinates are in several units, {named}: convert them to one with "
+            ".assign_coords()"
+        )
 
 
 def _distance(array: Any, name: str) -> float:

@@ -114,6 +114,17 @@ class LinearOperator(ABC):
         """What its repr says of it besides shapes, type and device."""
         return []
 
+    def __array__(self, *args: Any, **kwargs: Any) -> NDArray[Any]:
+        """Refuse to be an array, of which ``np.dot(A, x)`` would make an array of operators.
+
+        Raises:
+            InputError: always; A is applied as ``A @ x``.
+        """
+        raise InputError(
+            f"{type(self).__name__} is an operator and no array of numbers: write A @ x or A(x), "
+            "not np.dot(A, x)"
+        )
+
     @property
     def shape(self) -> tuple[int, int]:
         """(rows, columns) of its matrix: number of samples in its range, and in its domain."""

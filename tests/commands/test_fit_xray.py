@@ -15,7 +15,7 @@ from rift_cl.commands.fit_xray.settings import FitXraySettings
 from rift_cl.errors import InputError, StoppedError
 from rift_cl.geometry.seen_grid import seen_grid
 from rift_cl.io.scans.formats import open_scan
-from rift_cl.io.volumes import read_volume
+from rift_cl.io.volumes import read_volume, read_volume_place
 from rift_cl.metrics import psnr
 
 SIZE, VIEWS, PITCH = 48, 36, 0.5
@@ -237,6 +237,19 @@ def test_a_cone_beam_becomes_densities(cone, tmp_path):
     assert psnr(slices, truth, peak=0.5) > psnr(slices, truth[:, ::-1], peak=0.5) + 3
     scores = json.loads((tmp_path / "fit" / "metrics.json").read_text())["scores"]["held out"]
     assert scores["fit_error"] < 0.09
+
+
+def test_volumes_lie_where_those_of_reconstruct_do(scans, cone, tmp_path):
+    (parallel, _), (point, _) = scans[4], cone
+    axis, few = (SIZE - 1) / 2, {"steps": 1, "hold_out": 0, "format": "h5"}
+    given = {"center": axis, "rows": (1, 3), "unit": "mm"}
+    for name, path, options in (("parallel", parallel, given), ("cone", point, {"center": 12.5})):
+        fitted, sliced = tmp_path / f"{name} fit", tmp_path / f"{name} slices"
+        list(XrayFit(settings(path, fitted, splats=50, **{**few, **options})).run())
+        rift.reconstruct_scan(path, sliced, format="h5", kind="attenuation", **options)
+        place = read_volume_place(fitted / "volume.h5")
+        assert place.origin == pytest.approx(read_volume_place(sliced / "volume.h5").origin)
+        assert place.origin[0] == pytest.approx(PITCH if name == "parallel" else -8.5 / 2)
 
 
 @pytest.mark.parametrize(

@@ -59,6 +59,11 @@ def test_views_on_the_orbit_fill_the_widest_gap(on_orbit):
         assert view["camera"] == "the scanner"
 
 
+def test_focal_lengths_are_the_detectors_distance_in_its_bins(on_orbit):
+    for frame in json.loads((on_orbit / "transforms.json").read_text())["frames"]:
+        assert [frame["fl_x"], frame["fl_y"]] == pytest.approx([S / PITCH] * 2, rel=1e-7)
+
+
 def test_vectors_are_those_of_the_scanner_at_these_places(on_orbit):
     found = read_vectors(on_orbit / "vectors.txt")
     azimuths = np.deg2rad([float(view["azimuth, degrees"]) for view in views_of(on_orbit)])

@@ -3,6 +3,7 @@
 import dataclasses
 import json
 
+import h5py
 import numpy as np
 import pytest
 
@@ -71,6 +72,20 @@ def test_every_method_finds_the_slice(half, tmp_path, options):
     np.testing.assert_allclose(volume[0], volume[1], atol=1e-6)
     if "--nonnegative" in options:
         assert volume.min() >= 0
+
+
+def test_an_unfiltered_backprojection_has_no_unit(half, tmp_path, capsys):
+    path, _ = half
+    options = ("--center", 35.5, "--unit", "mm", "--format", "h5", "--method", "backproject")
+    found = []
+    for pitch in (0.5, 5.0):
+        out = tmp_path / f"{pitch}"
+        assert run("reconstruct", path, "--out", out, "--pitch", pitch, *options) == 0
+        with h5py.File(out / "volume.h5") as file:
+            found.append(file["volume"][...])
+            assert file["volume"].attrs["value_unit"] == "1"
+        assert "per mm" not in capsys.readouterr().out + (out / "report.html").read_text()
+    np.testing.assert_allclose(*found, rtol=1e-5)
 
 
 def test_steps_end_where_noise_is_left(half, tmp_path):

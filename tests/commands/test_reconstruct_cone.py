@@ -190,6 +190,19 @@ def test_an_object_longer_than_the_detector_is_told(tmp_path: Path, method: str)
         assert levels.max() < 1.25 * 0.02 and levels[-1] == pytest.approx(0.02, rel=0.02)
 
 
+def test_an_object_beyond_one_end_alone_is_told_of_that_end(tmp_path: Path) -> None:
+    angles = 2 * np.pi * np.arange(24) / 24
+    part = [Ellipsoid((10, 0, 0), (12.0, 9.0, 9.0), 0.0, 0.02)]
+    views = project(part, Grid((2, 2, 2)), Cone(angles, 12, 32, 2.0, R, S))
+    lengths = {"source_to_axis": R, "source_to_detector": S, "pitch": 2.0}
+    np.savez(tmp_path / "part.npz", projections=views, angles=angles, **lengths)
+    given: dict[str, Any] = {"center": 15.5, "kind": "attenuation"}
+    found = rift.reconstruct_scan(tmp_path / "part.npz", tmp_path / "out", **given)
+    (note,) = (note for note in found.notes if "not all views" in note)
+    assert "beyond the last row" in note and "2 slices at the upper end" in note
+    assert "lower" not in note
+
+
 @pytest.mark.full
 def test_binning_keeps_the_density(ball: Path, tmp_path: Path) -> None:
     found = rift.reconstruct_scan(ball, tmp_path / "a", center=CENTER, binning=2, pixel=1.0)

@@ -107,6 +107,8 @@ def test_binning_keeps_the_level_and_halves_the_volume(tmp_path):
     assert np.abs(coarse - blocks).mean() < 0.02 * fine.max()
     with h5py.File(tmp_path / "coarse/volume.h5") as file:
         np.testing.assert_allclose(file["volume"].attrs["spacing"], 1.0)
+        # The middle of the first block of rows, bins and columns, the whole of which is 80 wide.
+        np.testing.assert_allclose(file["volume"].attrs["origin"], [0.25, -19.5, -19.5])
     # The axis is found on the detector as it is, and recorded so.
     settings = json.loads((tmp_path / "coarse/config.json").read_text())["settings"]
     assert (settings["center"], settings["pitch"], settings["rows"]) == (41.5, 0.5, [0, ROWS])
@@ -117,6 +119,19 @@ def test_binning_of_an_odd_detector_says_what_it_leaves_out(tmp_path):
     volume = reconstruct(path, tmp_path / "out", "--center", 39.5, "--binning", 2)
     assert volume.shape == (2, 39, 39)
     assert "the last 1 row and the last 1 bin" in notes(tmp_path / "out")
+
+
+def test_rows_that_no_blocks_are_made_of_are_told(tmp_path):
+    path = write_counts(tmp_path / "scan.h5", line_integrals())
+    common = ("--center", 39.5, "--pitch", 0.5, "--unit", "mm", "--rings", "off", "--binning", 2)
+    all_of_them = reconstruct(path, tmp_path / "all", *common)
+    for first, stop, told in ((3, 9, True), (2, 8, False)):
+        out = tmp_path / f"{first}"
+        some = reconstruct(path, out, *common, "--rows", first, stop)
+        np.testing.assert_allclose(some, all_of_them[1:4], atol=1e-6)
+        assert ("the rows 2 to 7 were taken" in notes(out)) == told
+        with h5py.File(out / "volume.h5") as file:
+            assert file["volume"].attrs["origin"][0] == pytest.approx(1.25)
 
 
 @pytest.mark.parametrize(
@@ -258,6 +273,8 @@ def test_a_scan_of_one_row_is_binned_along_its_bins(tmp_path):
     path = write_counts(tmp_path / "scan.h5", line_integrals(rows=1))
     volume = reconstruct(path, tmp_path / "out", "--center", 39.5, "--binning", 2)
     assert volume.shape == (1, 40, 40)
+    with h5py.File(tmp_path / "out/volume.h5") as file:
+        assert file["volume"].attrs["origin"][0] == 0
     assert "Blocks of 1 x 2" in notes(tmp_path / "out")
 
 

@@ -66,6 +66,11 @@ def test_any_order_and_range_of_angles_is_kept(angles):
         np.r_[0, 137.5, 275, 52.5, 190, 327.5, 105, 242.5],
         np.arange(180) + 1e-3 * np.sin(np.arange(180)),
         np.linspace(0, 360, 200) + 0.05 * np.cos(3 * np.arange(200)),
+        np.arange(100) * 137.50776,
+        -np.arange(100) * 137.508,
+        np.arange(50) * 111.246 % 180,
+        np.linspace(0, 90, 7),
+        np.linspace(-7.5, 7.5, 15),
     ],
 )
 def test_degrees_are_refused(angles):
@@ -79,6 +84,9 @@ def test_degrees_are_refused(angles):
         np.deg2rad(np.arange(720)),
         np.arange(90) * np.pi * (3 - np.sqrt(5)),
         np.arange(75) * np.pi * (3 - np.sqrt(5)),
+        np.arange(200) * np.pi * (np.sqrt(5) - 1) / 2,
+        np.arange(40) * 2.0 * np.pi / 7 * 3 - 20.5,
+        np.random.default_rng(0).uniform(0, 180, 50),
         np.arange(75) * 2.3 + 0.01 * np.sin(np.arange(75)),
         np.arange(0, 13),
         [0, 45, 90],

@@ -87,11 +87,37 @@ def test_a_coordinate_that_falls_is_turned_round():
     assert np.allclose(found.center, grid.center)
 
 
-def test_degrees_are_read_as_they_are_marked():
-    scan = THINGS["sinogram"][0]
-    labelled = to_xarray(values_of((5, 7)), scan)
-    turned = labelled.assign_coords(theta=("theta", np.rad2deg(ANGLES), {"units": "degrees"}))
-    assert np.allclose(from_xarray(turned)[1].angles, ANGLES)
+def in_unit(unit, factor):
+    """A sinogram whose angles are in a unit that so many make a radian of."""
+    labelled = to_xarray(values_of((5, 7)), THINGS["sinogram"][0])
+    attributes = {} if unit is None else {"units": unit}
+    return labelled.assign_coords(theta=("theta", factor * ANGLES, attributes))
+
+
+def test_angles_are_read_in_the_unit_that_they_are_marked_with():
+    degrees = ("degrees", "deg", "Degree", "°", "arc_degree", "angle_degree", "degree_angle")
+    units = dict.fromkeys(degrees, 180 / np.pi) | dict.fromkeys((None, "", "rad", "radians"), 1)
+    for unit, factor in (units | {"mrad": 1000}).items():
+        assert np.allclose(from_xarray(in_unit(unit, factor))[1].angles, ANGLES), unit
+    with pytest.raises(InputError, match=r"theta is in 'turns'.*degrees"):
+        from_xarray(in_unit("turns", 1))
+
+
+def test_lengths_are_in_one_unit_by_whatever_name():
+    grid, cone = THINGS["slice"][0], THINGS["cone"][0]
+    slices, views = to_xarray(values_of((4, 6)), grid), to_xarray(values_of((5, 3, 7)), cone)
+    for axis, (one, other), array in (("x", "yx", slices), ("row", ("row", "detector"), views)):
+        mixed = array.copy()
+        mixed[one].attrs["units"], mixed[other].attrs["units"] = "mm", "millimeter"
+        again = from_xarray(mixed)[1]
+        assert np.shape(again.center) == (2,)
+        mixed[axis].attrs["units"] = "um"
+        with pytest.raises(InputError, match=r"several units.*um"):
+            from_xarray(mixed)
+    # Rows of parallel rays are numbers, whatever they are said to be in.
+    rows = to_xarray(values_of((5, 3, 7)), THINGS["sinograms"][0], unit="mm")
+    rows["row"].attrs["units"] = "pixel"
+    assert from_xarray(rows)[1].pitch == 0.25
 
 
 def uneven(labelled):

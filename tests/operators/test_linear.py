@@ -276,6 +276,9 @@ def test_a_product_with_an_array_is_refused(A, device):
     for product in products:
         with pytest.raises(InputError, match=r"write A\(x\) or A @ x"):
             product()
+    for product in (lambda: np.dot(A, X), lambda: np.dot(Y, A), lambda: np.asarray(A)):
+        with pytest.raises(InputError, match=r"no array.*A @ x"):
+            product()
     for nonsense in (lambda: A * "2", lambda: X + A, lambda: np.sin(A)):
         with pytest.raises(TypeError):
             nonsense()

@@ -215,6 +215,20 @@ def test_circular_vectors_are_reconstructed_as_their_cone(device):
     np.testing.assert_allclose(here, there, atol=1e-4)
 
 
+def test_a_detector_before_the_axis_sees_what_one_behind_it_does(device):
+    scan = circle(FULL[::3], center=(12.0, 17.1))
+    far, y = scan.vectors(), phantom.project(HEAD, GRID, scan)
+    near = replace(
+        far,
+        middle=far.source + 0.3 * (far.middle - far.source),
+        across=0.3 * far.across,
+        down=0.3 * far.down,
+    )
+    there = fbp(Projector(GRID, scan, device=device), y)
+    here = fbp(Projector(GRID, near, device=device), y)
+    np.testing.assert_allclose(here, there, atol=1e-4)
+
+
 @pytest.mark.parametrize("across", [1, -1])
 def test_detectors_whose_axes_run_backwards_give_the_same_volume(device, across):
     # The head leaves the detector at a side and at an end.

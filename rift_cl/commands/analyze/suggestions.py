@@ -18,6 +18,9 @@ from rift_cl.sampling.planning.planner import next_views
 _HIGH = 75.0
 # A pinhole of CameraType's: so small that everything is sharp.
 _PINHOLE = 1e4
+# Focal length of what stands for a camera, in radii of its opening or distances from the origin:
+# so short that its image distance, and with it the scale of its picture, is the same at any focus.
+_SHORT = 1e-9
 # Share of the target's outline in the picture; those who took the others chose theirs.
 _COVER = 0.05
 
@@ -69,7 +72,7 @@ def camera_type_of(camera: Camera) -> CameraType:
     focus wherever it looks.
     """
     lens, far = camera.aperture, float(np.linalg.norm(camera.center)) + 1.0
-    image = 1e-3 * (lens.radius if lens is not None else far)
+    image = _SHORT * (lens.radius if lens is not None else far)
     return CameraType(
         "as at hand",
         focal_length=image,

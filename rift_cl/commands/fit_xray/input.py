@@ -129,6 +129,16 @@ class XrayInput:
             return Grid((rows, self.scan.shape[2], self.scan.shape[2]))
         return seen_grid(self.scan.cone.scaled(1 / self.pitch), 1.0)
 
+    def first_sample(self, grid: Grid) -> tuple[float, float, float]:
+        """Where the first voxel stands, in the scan's unit, as ``rift reconstruct`` has it.
+
+        Args:
+            grid: the voxels, in lengths of bins. Parallel beams leave open how high they are, so
+                that heights count from the detector's row 0.
+        """
+        z, y, x = (self.pitch * float(grid.coordinates(axis)[0]) for axis in range(3))
+        return (self.rows[0] * self.pitch if self.scan.cone is None else z), y, x
+
     @property
     def need(self) -> int:
         """Bytes of host memory that a fit takes."""

@@ -111,6 +111,9 @@ class XrayFit(FitRun[FitXraySettings]):
         self.settled = dataclasses.replace(
             self.settings.decided(len(self.training_views)),
             training=trainer.settings,
+            rendering=dataclasses.replace(
+                self.settings.rendering, near=trainer.renderer.settings.near
+            ),
             center=whole.center,
             **self._parallel_facts(),
             unit=self.input.unit,
@@ -189,7 +192,12 @@ class XrayFit(FitRun[FitXraySettings]):
         slices = density * self._voxels(splats, whole)
         path, spacing = settings.out / VOLUME_NAMES[settings.format], (pitch,) * 3
         with open_volume(
-            path, slices.shape, format=settings.format, spacing=spacing, unit=source.unit
+            path,
+            slices.shape,
+            format=settings.format,
+            spacing=spacing,
+            unit=source.unit,
+            origin=source.first_sample(whole.grid),
         ) as writer:
             writer.write(0, slices)
         self.folder.drop(*(set(VOLUME_NAMES.values()) - {path.name}))

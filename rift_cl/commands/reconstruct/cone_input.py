@@ -263,17 +263,14 @@ class ConeInput:
         ]
 
     def _beyond_note(self) -> str:
-        below, above = self.beyond
-        further = (
-            f" Beyond them, {_slices(below)} below and {_slices(above)} above were solved for and "
-            "are left out."
-            if self.settings.iterative
-            else ""
-        )
+        named = zip(self.beyond, ("first", "last"), ("lower", "upper"), strict=True)
+        ends = [end for end in named if end[0]]
+        rows = " and the ".join(row for _, row, _ in ends)
+        seen = " and ".join(f"{_slices(count)} at the {end} end" for count, _, end in ends)
+        further = " As many beyond them were solved for and are left out."
         return (
-            "The object reaches beyond the first or the last row, so that not all views see "
-            f"{_slices(below)} at the lower end of the volume and {_slices(above)} at the upper: "
-            f"their values are less certain.{further}"
+            f"The object reaches beyond the {rows} row, so that not all views see {seen} of the "
+            f"volume: their values are less certain.{further if self.settings.iterative else ''}"
         )
 
     def _found_axis(self) -> dict[str, Any]:

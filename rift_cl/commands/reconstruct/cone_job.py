@@ -464,7 +464,8 @@ class ConeReconstruction:
             below, above = writer.clipped
             self.metrics |= {"clipped_below": below, "clipped_above": above}
             reached = statistics["minimum"], statistics["maximum"]
-            clipped = clipped_words((below, above), self._values, reached, self.source.unit)
+            unit = self.source.unit if self.settings.attenuation else ""
+            clipped = clipped_words((below, above), self._values, reached, unit)
             self._say(*[clipped] if clipped else [])
         self.folder.mark()
         self.folder.drop(*set(VOLUME_NAMES.values()) - {volume_path(self.settings).name})
@@ -522,6 +523,7 @@ class ConeReconstruction:
             origin=[float(grid.coordinates(axis)[0]) for axis in range(3)],
             dtype=settings.dtype,
             window=values,
+            attenuation=settings.attenuation,
         )
 
     def _check_place(self) -> None:

@@ -361,7 +361,8 @@ class Reconstruction:
             below, above = volume.clipped
             self.metrics |= {"clipped_below": below, "clipped_above": above}
             reached = statistics["minimum"], statistics["maximum"]
-            clipped = clipped_words((below, above), self._values, reached, self.source.unit)
+            unit = self.source.unit if self.settings.attenuation else ""
+            clipped = clipped_words((below, above), self._values, reached, unit)
             self._say(*[clipped] if clipped else [])
         # From here on the slices are this run's, and an earlier configuration no longer theirs.
         self.folder.mark()

@@ -121,7 +121,8 @@ def voxel(job: Reconstruction | ConeReconstruction) -> str:
     alike = max(edges) - min(edges) <= 1e-6 * max(edges)
     sizes = " x ".join(f"{edge:.4g}" for edge in (edges[-1:] if alike else edges))
     named = "" if alike else " (z, y, x)"
-    return f"{sizes} {job.source.unit}".rstrip() + f"{named}; values {_per(job.source.unit)}"
+    values = _per(job) or "without a unit"
+    return f"{sizes} {job.source.unit}".rstrip() + f"{named}; values {values}"
 
 
 def figures(job: Reconstruction | ConeReconstruction) -> dict[str, Any]:
@@ -129,13 +130,21 @@ def figures(job: Reconstruction | ConeReconstruction) -> dict[str, Any]:
     metrics = dict(job.metrics)
     if not {"minimum", "mean"} <= metrics.keys():
         return metrics
-    per = _per(job.source.unit)
-    metrics |= {name: f"{metrics[name]:.4g} {per}" for name in ("minimum", "maximum", "mean")}
+    per = _per(job)
+    for name in ("minimum", "maximum", "mean"):
+        metrics[name] = f"{metrics[name]:.4g} {per}".rstrip()
     return {"voxel": voxel(job), **metrics}
 
 
-def _per(unit: str) -> str:
-    return f"per {unit or 'unit of length'}"
+def _per(job: Reconstruction | ConeReconstruction) -> str:
+    """The unit of the values in words; empty where they have none."""
+    return f"per {job.source.unit or 'unit of length'}" if job.settings.attenuation else ""
+
+
+def _values(job: Reconstruction | ConeReconstruction) -> str:
+    """What slices hold, with its unit."""
+    per = _per(job)
+    return f"Attenuation {per}" if per else "Unfiltered backprojection"
 
 
 def write_preview(path: Path, image: NDArray[np.float32], title: str) -> None:
@@ -151,13 +160,13 @@ def reconstruction_page(job: Reconstruction | ConeReconstruction, preview: Previ
     """The report of a finished reconstruction."""
     page = Page(f"Reconstruction of {job.source.scan.path.name}", f"{job.shape[0]} slices")
     images = list(preview.panels.values())
-    window, per = display_window(images), _per(job.source.unit)
+    window, values = display_window(images), _values(job)
     show_slices(
         page,
         list(preview.frames.values()),
         labels=[f"slice {job.rows[0] + index}" for index in preview.frames],
         window=window,
-        what=f"Attenuation {per}, slices across the axis",
+        what=f"{values}, slices across the axis",
     )
     if preview.upright:
         show_slices(
@@ -165,14 +174,14 @@ def reconstruction_page(job: Reconstruction | ConeReconstruction, preview: Previ
             [smaller(np.stack(rows)) for rows in preview.upright.values()],
             labels=[f"y {row}" for row in preview.upright],
             window=window,
-            what=f"Attenuation {per}, planes along the axis",
+            what=f"{values}, planes along the axis",
         )
     if job.source.notes:
         page.section("Assumptions and corrections")
         for note in job.source.notes:
             page.paragraph(note)
     _residuals(page, job.inversion.residuals)
-    _histogram(page, images, job.source.unit)
+    _histogram(page, images, values)
     page.section("Result")
     page.facts(_facts(job))
     return page
@@ -199,7 +208,7 @@ def _residuals(page: Page, residuals: Mapping[int, list[float]]) -> None:
     )
 
 
-def _histogram(page: Page, images: list[NDArray[np.float32]], unit: str) -> None:
+def _histogram(page: Page, images: list[NDArray[np.float32]], values: str) -> None:
     low, high = display_window(images)
     edges = np.histogram_bin_edges([], bins=_BARS, range=(low, high))
     counts = np.sum([np.histogram(image, bins=edges)[0] for image in images], axis=0)
@@ -207,7 +216,7 @@ def _histogram(page: Page, images: list[NDArray[np.float32]], unit: str) -> None
     draw = partial(
         curves,
         {"samples": ((edges[1:] + edges[:-1]) / 2, share)},
-        xlabel=f"attenuation, {_per(unit)}",
+        xlabel=values,
         ylabel="samples, %",
     )
     page.section("Values")

@@ -281,6 +281,11 @@ class ReconstructSettings(
         return self.method in ITERATIVE
 
     @property
+    def attenuation(self) -> bool:
+        """Whether slices hold attenuation per unit of length; backprojected integrals do not."""
+        return self.method != "backproject"
+
+    @property
     def most_steps(self) -> int:
         """Maximum number of iterations per slice; 1 for a direct method."""
         if not self.iterative:

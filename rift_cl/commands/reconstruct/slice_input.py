@@ -132,6 +132,12 @@ class SliceInput:
         return at_axis(self.geometry).pitch
 
     @property
+    def height(self) -> float:
+        """Height of the first slice above the file's row 0: that of the middle of its block."""
+        block = row_binning(self.file, self.settings.binning)
+        return (self.rows[0] + (block - 1) / (2 * block)) * self.pitch
+
+    @property
     def detector_pitch(self) -> float:
         """Distance between bins of the detector as the file has it."""
         pitch = self._pitch if self.fan is None else self.fan.pitch
@@ -416,6 +422,7 @@ def _notes_of(source: SliceInput) -> list[str]:
         notes += _fan_note(source)
     if source.settings.binning > 1:
         notes.append(_binning_note(source))
+        notes += _rows_note(source)
     if source.stitched is not None:
         notes.append(_stitched_note(source))
     elif source.settings.half_acquisition == "stitched":
@@ -491,6 +498,18 @@ def _binning_note(source: SliceInput) -> str:
     return (
         f"Blocks of {block} x {n} (rows x bins) detector pixels were averaged{of}. {lost}".rstrip()
     )
+
+
+def _rows_note(source: SliceInput) -> list[str]:
+    """Which rows were taken, where blocks do not begin or end at those that were asked for."""
+    asked, block = source.settings.rows, row_binning(source.file, source.settings.binning)
+    first, stop = (block * row for row in source.rows)
+    if asked is None or tuple(asked) == (first, stop):
+        return []
+    return [
+        f"Of --rows {asked[0]} {asked[1]}, the rows {first} to {stop - 1} were taken, as blocks of "
+        f"{block} rows are counted from the detector's first row."
+    ]
 
 
 def _stitched_note(source: SliceInput) -> str:

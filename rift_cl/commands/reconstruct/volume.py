@@ -61,9 +61,10 @@ def open_slices(
         format=settings.format,
         spacing=(source.pitch, window.pixel, window.pixel),
         unit=source.unit,
-        origin=(source.rows[0] * source.pitch, *(grid.coordinates(axis)[0] for axis in (-2, -1))),
+        origin=(source.height, *(grid.coordinates(axis)[0] for axis in (-2, -1))),
         dtype=settings.dtype,
         window=values,
+        attenuation=settings.attenuation,
     )
 
 
@@ -95,7 +96,7 @@ def clipped_words(
         clipped: how many values were below and above.
         window: its ends.
         reached: the least value of the volume, and the greatest.
-        unit: of length.
+        unit: of length, one over which is that of the values; empty where it is not.
     """
     per = f" per {unit}" if unit else ""
     (below, above), (low, high), (least, most) = clipped, window, reached

@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from rift_cl.cl.host_arrays import as_real_array
 from rift_cl.errors import ShapeError
+from rift_cl.geometry.scan_value import checked_angles
 from rift_cl.io.scans.literals import Kind
 from rift_cl.io.scans.scan_file import Frames, Part, ScanFile, ScanRows, check_angles
 
@@ -71,6 +72,7 @@ def scan_of_arrays(
         ShapeError: an array has other axes, or the numbers of angles and projections differ.
         DTypeError: an array does not hold real numbers.
         NonFiniteError: an angle is NaN or infinite.
+        InputError: the angles look like degrees.
     """
     stack = _frames(path, "projections", projections, None)
     others = [
@@ -78,10 +80,11 @@ def scan_of_arrays(
         for name, given in (("flats", flats), ("darks", darks))
     ]
     directions = as_real_array(angles, name="angles").astype(np.float64).ravel()
+    directions = check_angles(path, "angles", directions, projections=len(stack))
     return ScanFile(
         path=path,
         shape=(stack.shape[0], stack.shape[1], stack.shape[2]),
-        angles=check_angles(path, "angles", directions, projections=len(stack)),
+        angles=checked_angles(str(path), directions),
         pitch=pitch,
         unit=unit,
         kind=kind or ("attenuation" if flats is None else "counts"),

@@ -59,6 +59,7 @@ class VolumeLayout:
         unit: unit of the spacing, empty where it is not known.
         origin: position of the first sample along each axis, in the same unit.
         window: what the samples stand for where they are integers; None for float32.
+        attenuation: whether the values are attenuation; others have no unit.
     """
 
     shape: tuple[int, int, int]
@@ -66,6 +67,7 @@ class VolumeLayout:
     unit: str
     origin: tuple[float, float, float] = (0.0, 0.0, 0.0)
     window: SampleWindow | None = None
+    attenuation: bool = True
 
     @property
     def dtype(self) -> np.dtype[Any]:
@@ -91,7 +93,9 @@ class VolumeLayout:
 
     @property
     def value_unit(self) -> str:
-        """Unit of attenuation: one over the unit of length."""
+        """Unit of attenuation, one over the unit of length; "1" of values that have none."""
+        if not self.attenuation:
+            return "1"
         return f"1/{self.unit}" if self.unit else ""
 
     @property

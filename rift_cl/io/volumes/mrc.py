@@ -75,7 +75,7 @@ def _write_header(layout: VolumeLayout, part: Path) -> int:
 
 def _write_labels(header: Any, layout: VolumeLayout) -> None:
     """Replace the library's own label, which holds the time."""
-    labels = [f"Attenuation in {layout.value_unit}" if layout.value_unit else "Attenuation"]
+    labels = [_values(layout)]
     if layout.window is not None:
         numbers = layout.window.attributes
         labels += [f"{name} = {numbers[name]!r}" for name in ("add_offset", "scale_factor")]
@@ -84,6 +84,13 @@ def _write_labels(header: Any, layout: VolumeLayout) -> None:
     for index, label in enumerate(labels):
         header.label[index] = label.encode("ascii", "replace")[:80]
     header.nlabl = len(labels)
+
+
+def _values(layout: VolumeLayout) -> str:
+    """What the samples are, for a reader."""
+    if not layout.attenuation:
+        return "Values without a unit"
+    return f"Attenuation in {layout.value_unit}" if layout.value_unit else "Attenuation"
 
 
 def _write_statistics(statistics: SliceStatistics, part: Path) -> None:

@@ -78,6 +78,7 @@ def open_volume(
     origin: float | Sequence[float] = 0.0,
     dtype: SampleType = "float32",
     window: tuple[float, float] | None = None,
+    attenuation: bool = True,
 ) -> VolumeWriter:
     """Prepare to write a volume; nothing is written before the ``with`` block begins.
 
@@ -96,6 +97,8 @@ def open_volume(
         dtype: type of the samples in the file.
         window: for integers, the values that the least and the greatest integer stand for; values
             in between are rounded to the nearest, others are clipped and counted.
+        attenuation: whether the values are attenuation per unit of length; others are noted to have
+            no unit.
 
     Returns:
         A context manager; leaving it without an exception makes the volume appear.
@@ -113,7 +116,12 @@ def open_volume(
         raise ShapeError(f"{path}: shape is {grid.shape}, a volume has (z, y, x)")
     first = Grid(grid.shape, grid.spacing, origin).center
     layout = VolumeLayout(
-        _three(grid.shape), _three(grid.spacing), unit, _three(first), _window(path, dtype, window)
+        _three(grid.shape),
+        _three(grid.spacing),
+        unit,
+        _three(first),
+        _window(path, dtype, window),
+        attenuation,
     )
     if format == "mrc" and dtype == "uint8":
         raise InputError(f"{path}: MRC has no unsigned 8-bit samples; choose uint16")

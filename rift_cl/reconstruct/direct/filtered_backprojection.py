@@ -6,6 +6,9 @@ that view j stands for (Kak and Slaney, section 3.3). Without h the result is th
 with 1 / r: low frequencies are counted once for every view, which is the bias that the RiFT paper
 shows in its Figures 4 and 5.
 
+A full turn whose axis is off the middle of the detector measures lines near it twice and those
+beyond once: its rays are weighed so that every line counts once (``offset_axis``).
+
 Where directions are few or lie unevenly, what a view stands for depends on frequency as well, and
 each view gets a filter of its own (rift_cl/operators/filters/compensation.py).
 """
@@ -14,7 +17,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator
-from functools import partial
+from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
@@ -47,6 +50,8 @@ from rift_cl.reconstruct.direct.fdk import (
     slices_of,
 )
 from rift_cl.reconstruct.direct.katsevich import Katsevich, cone_inversion
+from rift_cl.reconstruct.direct.offset_axis import is_weighed, offset_weights, widened_scan
+from rift_cl.reconstruct.direct.ray_factors import RayFactors
 from rift_cl.reconstruct.direct.view_weights import view_gains
 
 Floats = NDArray[np.float64]
@@ -56,7 +61,8 @@ class FilteredBackprojection(Composite):
     """Filtered backprojection as an operator from sinograms to images.
 
     Args:
-        A: the projector whose geometry to use.
+        A: the projector whose geometry to use. Of a full turn whose axis is off the middle of the
+            detector, rays count so that every line does once.
         filter: a name (``ram-lak``, ``shepp-logan``, ``cosine``, ``hamming``, ``hann``,
             ``high-pass``), a filter, or a function of frequency.
         compensate: what each view stands for. ``uniform``: every view the same. ``voronoi``: half
@@ -80,6 +86,14 @@ class FilteredBackprojection(Composite):
         diameter: float | None = None,
     ) -> None:
         super().__init__(A.range, A.domain, A.device, A.dtype)
+        self._given = A
+        # Of an axis off the middle: weights, the wider detector's projector, and where it begins.
+        self._rays: NDArray[Any] | None = None
+        self._before = 0
+        if is_weighed(A.scan):
+            self._rays = offset_weights(A.scan).astype(self.dtype)
+            wide, self._before = widened_scan(A.scan)
+            A = A.of_scan(wide)
         self._A = A
         self._compensate, self._diameter = compensate, diameter
         size = object_diameter(A) if diameter is None else one_number(diameter)
@@ -100,41 +114,77 @@ class FilteredBackprojection(Composite):
         settled = partial(
             FilteredBackprojection, compensate=self._compensate, diameter=self._diameter
         )
-        return settled, (self._A, self._filter.filter)
+        return settled, (self._given, self._filter.filter)
 
     def _facts(self) -> list[str]:
         compensate = [] if self._compensate is None else [f"compensate {self._compensate}"]
-        return [repr(self._filter.filter), *compensate, *self._A._facts()]
+        offset = [] if self._rays is None else [f"axis at bin {self._given.scan.center:g}"]
+        return [repr(self._filter.filter), *compensate, *offset, *self._given._facts()]
+
+    @cached_property
+    def _weighting(self) -> RayFactors:
+        """Lays weighed rays onto the wider detector."""
+        rays, bins = self._on_wider(self._rays), self._A.scan.bins
+        return RayFactors(self.device, self.dtype, np.ones((1, bins)), rays[None], self._before)
+
+    def _on_wider(self, narrow: Any) -> NDArray[Any]:
+        """Bins of the detector on the wider one, 0 beside it."""
+        after = self._A.scan.bins - self._before - narrow.shape[-1]
+        return np.pad(narrow, [(0, 0)] * (narrow.ndim - 1) + [(self._before, after)])
+
+    def _wide(self, shape: tuple[int, ...]) -> tuple[int, ...]:
+        return (*shape[:-1], self._A.scan.bins)
 
     def _apply(self, x: Any, out: Any) -> None:
-        filtered = self.device.empty(x.shape, self.dtype)
-        self._filter._apply(x, filtered)
+        rays = x
+        if self._rays is not None:
+            rays = self.device.empty(self._wide(x.shape), self.dtype)
+            self._weighting.widen(x, rays)
+        filtered = self.device.empty(rays.shape, self.dtype)
+        self._filter._apply(rays, filtered)
         self._A._apply_adjoint(filtered, out)
 
     def _apply_adjoint(self, y: Any, out: Any) -> None:
-        projected = self.device.empty(out.shape, self.dtype)
+        projected = self.device.empty(self._wide(out.shape), self.dtype)
         self._A._apply(y, projected)
-        self._filter._apply_adjoint(projected, out)
+        if self._rays is None:
+            self._filter._apply_adjoint(projected, out)
+            return
+        rays = self.device.empty(projected.shape, self.dtype)
+        self._filter._apply_adjoint(projected, rays)
+        self._weighting.narrow(rays, out)
 
     def _apply_steps(self, x: NDArray[Any], y: NDArray[Any]) -> None:
-        filtered = np.empty_like(x)
-        self._filter._apply_host(x, filtered)
+        rays = x if self._rays is None else self._on_wider(x * self._rays)
+        filtered = np.empty_like(rays)
+        self._filter._apply_host(rays, filtered)
         self._A._apply_adjoint_host(filtered, y)
 
     def _apply_adjoint_steps(self, y: NDArray[Any], x: NDArray[Any]) -> None:
-        projected = np.empty_like(x)
+        projected = np.empty(self._wide(x.shape), self.dtype)
         self._A._apply_host(y, projected)
-        self._filter._apply_adjoint_host(projected, x)
+        if self._rays is None:
+            self._filter._apply_adjoint_host(projected, x)
+            return
+        rays = np.empty_like(projected)
+        self._filter._apply_adjoint_host(projected, rays)
+        seen = slice(self._before, self._before + x.shape[-1])
+        np.multiply(rays[..., seen], self._rays, out=x)
+
+    @property
+    def _sinograms(self) -> int:
+        """Sinograms, as wide as the projector's, that a slice needs at the same time."""
+        return 2 if self._rays is None else 3
 
     @property
     def scratch(self) -> int:
-        """The filtered sinogram, besides what filter and projector need."""
-        views = self.dtype.itemsize * math.prod(self.domain)
-        return views + self._filter.scratch + self._A.scratch
+        """Weighed and filtered sinograms, besides what filter and projector need."""
+        views = self.dtype.itemsize * math.prod(self._A.range)
+        return (self._sinograms - 1) * views + self._filter.scratch + self._A.scratch
 
     def _chunks(self, budget: int) -> Iterable[Chunk]:
-        # The sinogram and the filtered one.
-        chunks = self._A.chunks(budget, sinograms=2, fixed=self._filter.scratch)
+        # The sinogram, the weighed one where there is one, and the filtered one.
+        chunks = self._A.chunks(budget, sinograms=self._sinograms, fixed=self._filter.scratch)
         return [chunk.transposed for chunk in chunks]
 
 
@@ -152,9 +202,11 @@ def fbp(
     Args:
         A: the projector that describes grid and scan. Parallel views that cover less than half a
             turn are taken as they are: what lies between the first and the last is missing from
-            the image. A cone's source goes round a full turn or
-            half a turn and the fan; the rotation axis may be near one side of the detector in a
-            full turn (see ``FDK``). Or it goes along an even helix (see ``Katsevich``).
+            the image. Those of a full turn whose axis is off the middle of the detector are weighed
+            so that every line counts once, to the end of its longer side. A cone's source goes
+            round a full turn or half a turn and the fan; the rotation axis may be near one side of
+            the detector in a full turn (see ``FDK``). Or it goes along an even helix (see
+            ``Katsevich``).
         y: sinogram (angles, bins) or projections (angles, rows, bins); line integrals in the
             image's unit times the grid's unit of length.
         filter: a name (``ram-lak``, ``shepp-logan``, ``cosine``, ``hamming``, ``hann``,
@@ -194,7 +246,8 @@ def backproject(A: ParallelProjector | Projector, y: Any, *, out: Any = None) ->
     """Backproject without a filter, every view alike: the paper's unfiltered baseline.
 
     ``A``, ``y``, ``out`` and errors are those of ``fbp``. The result is the image convolved with
-    1 / r, in the image's unit times a length; compare it after an affine fit.
+    1 / r, in the image's unit times a length, so that of attenuation it has no unit; compare it
+    after an affine fit.
     """
     return unfiltered_backprojection(A)(y, out, name="y")
 

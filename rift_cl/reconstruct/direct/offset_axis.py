@@ -121,8 +121,19 @@ def offset_weights(scan: Parallel) -> Floats:
     return displaced_detector(np.arange(scan.bins, dtype=np.float64) - scan.center, share)
 
 
+def is_weighed(scan: Parallel) -> bool:
+    """Whether filtered backprojection weighs a scan itself, as of one that ``widened`` did not.
+
+    A full turn whose sides differ by a bin or less is taken as it is: ``widened`` leaves such.
+    """
+    uneven = is_uneven(scan.center, scan.bins) and abs(_right_over_left(scan)) > 1
+    return uneven and is_full_turn(scan.angles)
+
+
 def widened(projections: Stack, scan: Parallel) -> tuple[Stack, Parallel]:
     """Weigh a full turn with an axis off the middle and continue its shorter side by zeros.
+
+    ``fbp`` does so itself; this is for what else takes views of half a turn and the like.
 
     Args:
         projections: line integrals, (angle, bin) or (angle, row, bin).
@@ -131,10 +142,22 @@ def widened(projections: Stack, scan: Parallel) -> tuple[Stack, Parallel]:
     Returns:
         Projections as wide as twice the longer side, and their geometry.
     """
-    left, right = scan.center, scan.bins - 1 - scan.center
-    missing = int(np.ceil(abs(right - left)))
-    before, after = (missing, 0) if right > left else (0, missing)
+    wide, before = widened_scan(scan)
+    after = wide.bins - scan.bins - before
     weighted = np.asarray(projections, np.float32) * offset_weights(scan).astype(np.float32)
     margins = [(0, 0)] * (weighted.ndim - 1) + [(before, after)]
-    wide = Parallel(scan.angles, scan.bins + missing, scan.pitch, scan.center + before)
     return np.pad(weighted, margins), wide
+
+
+def widened_scan(scan: Parallel) -> tuple[Parallel, int]:
+    """The scan of a detector as wide as twice the longer side, and how many bins come before."""
+    longer = _right_over_left(scan)
+    missing = int(np.ceil(abs(longer)))
+    before = missing if longer > 0 else 0
+    bins = scan.bins + missing
+    return Parallel(scan.angles, bins, scan.pitch, scan.center + before), before
+
+
+def _right_over_left(scan: Parallel) -> float:
+    """Bins that a detector has after the axis beyond those before it."""
+    return scan.bins - 1 - scan.center - scan.center

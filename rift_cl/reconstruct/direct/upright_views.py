@@ -69,13 +69,18 @@ def _read_by(
     ahead = np.stack([-sine, cosine, zero], axis=1)
     up = np.array([0.0, 0.0, 1.0])
     reach = scan.middle - scan.source
-    down, across = (float(np.median(np.linalg.norm(v, axis=1))) for v in (scan.down, scan.across))
-    counts, pitch = (scan.rows, finer * scan.bins), (down, across / finer)
-    aside = float(np.median(reach[:, 2])), float(np.median((reach * along).sum(axis=1)))
-    center = tuple((n - 1) / 2 - a / p for n, a, p in zip(counts, aside, pitch, strict=True))
     distance = float(np.median((reach * ahead).sum(axis=1)))
+    # A cone's detector is never before the axis: one that is, is seen from the source at the axis.
+    far = max(distance, radius)
+    grown = far / distance
+    down, across = (
+        grown * float(np.median(np.linalg.norm(v, axis=1))) for v in (scan.down, scan.across)
+    )
+    counts, pitch = (scan.rows, finer * scan.bins), (down, across / finer)
+    aside = tuple(grown * float(np.median((reach * way).sum(axis=1))) for way in (up, along))
+    center = tuple((n - 1) / 2 - a / p for n, a, p in zip(counts, aside, pitch, strict=True))
     heights = np.full(scan.views, height)
-    cone = Cone(angles, *counts, pitch, radius, max(distance, radius), center, heights)
+    cone = Cone(angles, *counts, pitch, radius, far, center, heights)
     # The ray to pixel (i, k) of an upright detector, counted from its middle, is linear in both.
     straight = cone.source_to_detector * ahead + aside[1] * along + aside[0] * up
     columns, rows = pitch[1] * along, np.broadcast_to(pitch[0] * up, along.shape)

@@ -4,8 +4,8 @@ The view at angle ``a + pi`` sees every line of the view at ``a`` from behind, a
 put beside it, the two make one view nearly twice as wide; where both see the same lines they are
 blended with weights that go smoothly from one to the other (as ``offset_axis.offset_weights``).
 The joined sinogram is one of a half turn, which everything else takes as it is: ring removal,
-solvers, other programs. Filtered backprojection alone has no need of it; ``offset_axis.widened``
-gives the same slices by weights, without reading between samples.
+solvers, other programs. Filtered backprojection alone has no need of it: ``fbp`` weighs the rays of
+such a turn itself (``offset_axis``), which gives the same slices without reading between samples.
 
 Where no view looks exactly the opposite way, views next to it are interpolated in angle; where
 twice the axis' bin is no whole number, the mirrored bins are read between samples.

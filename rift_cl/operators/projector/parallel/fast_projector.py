@@ -175,6 +175,10 @@ class FastProjector(ParallelProjector):
         """Bins after which a view's continuation repeats itself."""
         return self._rays.length
 
+    def of_scan(self, scan: Parallel) -> FastProjector:
+        """The projector of another scan, with this one's grid, error, lobes and device."""
+        return FastProjector(self.grid, scan, self.error, lobes=self.lobes, device=self.device)
+
     def __reduce__(self) -> tuple[Any, ...]:
         make = partial(FastProjector, lobes=self.lobes, device=self.device)
         return make, (self.grid, self.scan, self.error)

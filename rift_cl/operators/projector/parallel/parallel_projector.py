@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from abc import abstractmethod
 from collections.abc import Iterable
 
 import numpy as np
@@ -56,6 +57,10 @@ class ParallelProjector(LinearOperator):
         shape = (len(scan.angles), *grid.shape[:-2], scan.bins)
         super().__init__(grid.shape, shape, device or default_device(), dtype)
         self.grid, self.scan = grid, scan
+
+    @abstractmethod
+    def of_scan(self, scan: Parallel) -> ParallelProjector:
+        """The projector of another scan that is like this one in all else."""
 
     def _facts(self) -> list[str]:
         lengths = self.grid.spacing if len(set(self.grid.spacing)) > 1 else self.grid.spacing[:1]

@@ -106,6 +106,10 @@ class PhaseProjector(ParallelProjector, Projector):
         by_rows, by_columns = self._tables
         return _Walk(self.device, by_rows, self.dtype), _Walk(self.device, by_columns, self.dtype)
 
+    def of_scan(self, scan: Parallel) -> PhaseProjector:
+        """The projector of another scan, with this one's grid, footprint, device and type."""
+        return PhaseProjector(self.grid, scan, self.footprint, self.device, self.dtype)
+
     def _facts(self) -> list[str]:
         return [*super()._facts(), f"footprint {self.footprint}"]
 
