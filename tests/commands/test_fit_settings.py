@@ -43,6 +43,7 @@ OTHERS = {
     "strategy.prune_screen_size": 0.5,
     "test": (Path("one"), Path("two")),
     "out": Path("other"),
+    "rendering.near": 0.5,
     "rendering.far": 5.0,
     "rendering.tile": 8,
     "homogenise": 0.75,

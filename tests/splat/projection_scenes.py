@@ -107,13 +107,14 @@ def full_covars(values, kind):
 def twin_of(values, kind, camera=None, covars=None):
     """The reference projection of the same numbers."""
     settings = kind.settings
-    names = ("near", "far", "radius_clip", "eps2d", "antialiased", "mode")
+    names = ("far", "radius_clip", "eps2d", "antialiased", "mode")
     return project_splats(
         values["means"].astype(float),
         full_covars(values, kind) if covars is None else covars,
         values["opacities"].astype(float),
         camera or kind.camera,
         **{name: getattr(settings, name) for name in names},
+        near=settings.near_plane,
         tile=settings.tile or 16,
     )
 

@@ -163,7 +163,7 @@ def test_resets_scale_with_the_run_but_leave_time_to_come_back(ball, steps, how,
 
 def test_penalties_end_with_the_cooldown_and_densification_has_none(ball):
     chain, densify = begun(ball, MCMC)[1], begun(ball, DEFAULT)[1]
-    assert chain.penalties(29) == (0.01, 0.01)
+    assert chain.penalties(29) == (0.01, 0.05)
     assert chain.penalties(30) == (0, 0)
     assert all(densify.penalties(step) == (0, 0) for step in (0, 29, 39))
 

@@ -57,7 +57,8 @@ def test_priors_end_with_the_cooldown(device):
     end = trainer.schedule.cooldown
     assert STEPS * ALL.first < end < STEPS
     weights = [trainer._surface_penalties(step) for step in (5, 6, end - 1, end)]
-    assert weights == [SurfacePenalties(), (0.1, 0.1, 0.1), (0.1, 0.1, 0.1), SurfacePenalties()]
+    priors = (0.1 / trainer.size, 0.1, 0.1)
+    assert weights == [SurfacePenalties(), priors, priors, SurfacePenalties()]
     assert ALL.wanted and not SETTINGS.surface.wanted
 
 
