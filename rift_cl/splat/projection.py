@@ -358,7 +358,9 @@ def _check(device: Device, splats: Splats, camera: Camera, settings: SplatSettin
         )
     if camera.model == "pinhole" and settings.near_plane <= 0:
         raise SettingError(
-            settings, "near", f"is {settings.near_plane}, a pinhole camera wants a positive distance"
+            settings,
+            "near",
+            f"is {settings.near_plane}, a pinhole camera wants a positive distance",
         )
 
 

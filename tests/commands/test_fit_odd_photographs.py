@@ -99,7 +99,8 @@ def test_a_fit_that_is_no_better_than_its_neighbours_is_told(capture, tmp_path, 
     (shuffled / "transforms.json").write_text(json.dumps(record))
     assert "poses, intrinsics or masks" in told(shuffled, tmp_path / "fit", capsys, "--steps", 5)
     assert "poses, intrinsics or masks" in (tmp_path / "fit" / "report.html").read_text()
-    assert "poses, intrinsics" not in told(capture, tmp_path / "right", capsys, "--steps", 400, "--splats", 600)
+    enough = ("--steps", 400, "--splats", 600)
+    assert "poses, intrinsics" not in told(capture, tmp_path / "right", capsys, *enough)
 
 
 def test_brightness_is_a_factor_of_each_picture():
