@@ -20,8 +20,8 @@ _Y0 = 0.28209479177387814
 _OPACITY = 0.1
 # A splat begins as large as the distance to so many neighbours.
 _NEIGHBOURS = 3
-# Condition number of axes that are parallel to rounding, and the root mean square angle, in degrees,
-# up to which axes that do not meet count as such.
+# Condition number of axes that are parallel to rounding, and the root mean square angle, in
+# degrees, up to which axes that do not meet count as such.
 _PARALLEL, _NEARLY = 1e8, 2.0
 # Root mean square angle by which axes miss a point where they meet, as a share of the spread of
 # directions.
