@@ -77,7 +77,7 @@ def table_numbers(
     width = max((len(cells) for _, cells in rows), default=0)
     if column is None and (width <= 1 or whole):
         return np.array([_number(path, at, word, what) for at, row in rows for word in row]), ""
-    header = rows[0][1] if rows and not any(map(_is_number, rows[0][1])) else []
+    header = rows[0][1] if rows and not any(map(is_number, rows[0][1])) else []
     place = _place(path, column, header, width, called, rows)
     body = rows[1:] if header else rows
     short = [at for at, row in body if len(row) <= place]
@@ -97,7 +97,8 @@ def _cells(line: str) -> list[str]:
     return [cell.strip() for cell in line.split("\t")] if "\t" in line else line.split()
 
 
-def _is_number(word: str) -> bool:
+def is_number(word: str) -> bool:
+    """Whether a word is a number in decimal digits, or NaN or infinity."""
     try:
         float(word)
     except ValueError:

@@ -22,6 +22,7 @@ from rift_cl.io.captures.colmap_records import (
     PointRecords,
     parameter_count,
 )
+from rift_cl.io.number_list import is_number
 
 _Number = TypeVar("_Number", int, float)
 # What an image's line holds before its name, and a point's before its track.
@@ -120,21 +121,13 @@ def _holds_features(where: str, line: str) -> bool:
     """
     words = line.split()
     # Without an extension the name of an image may be a number as well.
-    if len(words) == _BEFORE_NAME + 1 or not _is_number(words[-1]):
+    if len(words) == _BEFORE_NAME + 1 or not is_number(words[-1]):
         return False
     if len(words) % _FEATURE:
         raise FileFormatError(
             f"{where}: has {len(words)} entries, wanted the features of the image above, x, y and "
             "the number of the point of each, or another image, which ends in its name"
         )
-    return True
-
-
-def _is_number(word: str) -> bool:
-    try:
-        float(word)
-    except ValueError:
-        return False
     return True
 
 
