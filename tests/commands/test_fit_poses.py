@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from test_start import moved, ring, turned
+from test_start import moved, ring, survey, turned
 
 from rift_cl.commands.cli import main
 from rift_cl.commands.fit_photos.pose_check import check_poses
@@ -94,6 +94,14 @@ def test_poses_that_look_past_the_points_are_told_with_what_they_are(case):
     check_poses(ring(), points, WHERE)
     with pytest.raises(InputError, match=f"capture: half of the photographs.*{words}"):
         check_poses(change(ring()), points, WHERE)
+
+
+def test_each_picture_of_a_survey_may_show_few_of_the_points():
+    cameras = survey(400)
+    points = np.random.default_rng(0).uniform((0, -1, 3.9), (270, 1, 4.1), (20_000, 3))
+    check_poses(cameras, points.astype(np.float32), WHERE)
+    with pytest.raises(InputError, match="check the poses"):
+        check_poses(turned(cameras, (1, -1, -1)), points.astype(np.float32) + 500, WHERE)
 
 
 def test_few_pictures_may_miss_the_points_and_points_may_be_missing():

@@ -22,9 +22,9 @@ from rift_cl.train.start.points import scene_size
 Floats = NDArray[np.float64]
 
 # Cameras and points that are looked at.
-_CAMERAS, _POINTS = 64, 5_000
+_CAMERAS, _POINTS = 64, 200_000
 # Share of the points that lies in a picture, in the median, from which poses are believed, and that
-# other poses must reach to be named.
+# other poses must reach to be named. Each picture of a survey shows a small share, but some.
 _FEWEST, _MANY = 0.02, 0.2
 # Turns the axes of OpenGL's cameras into those of OpenCV's, and back.
 _TURN = np.diag([1.0, -1.0, -1.0, 1.0])
@@ -59,14 +59,13 @@ def check_poses(cameras: Sequence[Camera], points: NDArray[np.float32] | None, w
     share = _seen(few, some)
     if share >= _FEWEST:
         return
-    reason = "check the poses, the intrinsics, and that the points belong to them"
-    for words, others in _other_poses(few):
-        if _seen(others, some) >= _MANY:
-            reason = words
-            break
+    fitting = (words for words, others in _other_poses(few) if _seen(others, some) >= _MANY)
+    reason = next(fitting, "")
+    if share and not reason:
+        return
     raise InputError(
-        f"{where}: half of the photographs show less than {100 * _FEWEST:.0f} % of the sparse "
-        f"points: {reason}"
+        f"{where}: half of the photographs show at most {100 * share:.1f} % of the sparse points: "
+        + (reason or "check the poses, the intrinsics, and that the points belong to them")
     )
 
 
