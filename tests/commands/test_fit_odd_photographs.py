@@ -88,6 +88,22 @@ def test_a_photograph_that_the_object_fills_belongs_to_what_is_cut_out(capture, 
     assert pictures.foreground(1).mean() == pytest.approx(2 / 3)
 
 
+@pytest.mark.filterwarnings("always:.*its mask is black")
+@pytest.mark.parametrize("black", [[0], [0, 3, 6]])
+def test_photographs_with_a_black_mask_are_not_scored(capture, tmp_path, capsys, black):
+    masked = changed(capture, tmp_path / "masked", lambda _, image: image)
+    (masked / "masks").mkdir()
+    for number in range(8):
+        mask = np.full((60, 80), float(number not in black))
+        write_png(masked / "masks" / f"{number}.png", mask)
+    said = told(masked, tmp_path / "fit", capsys, "--steps", 5)
+    assert "0.png: its mask is black, so that it is not scored" in said
+    found = json.loads((tmp_path / "fit" / "metrics.json").read_text())["views"]
+    assert len(found.get("held out", [])) == 3 - len(black)
+    words = ["eval", str(tmp_path / "fit"), "--out", str(tmp_path / "scores")]
+    assert (main(words) == 0) == (len(black) == 1)
+
+
 def test_a_fit_that_is_no_better_than_its_neighbours_is_told(capture, tmp_path, capsys):
     shuffled = tmp_path / "shuffled"
     shuffled.mkdir()

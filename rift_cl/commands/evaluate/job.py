@@ -182,6 +182,9 @@ class Evaluation:
             for score in score_views(renderer, splats, test, training, self.more):
                 self.scores[name].append(score)
                 yield Report(len(self.scores[name]), len(views), f"views of {name}")
+        self.scores = {name: scores for name, scores in self.scores.items() if scores}
+        if not self.scores:
+            raise InputError(f"{self.scene.name}: every mask is black, there is nothing to score")
         self.metrics = {
             "splats": len(self.scene.splats),
             "eps2d": self.scene.rendering.eps2d,

@@ -216,6 +216,7 @@ class Fit(FitRun[FitPhotosSettings]):
                 self.scores[name].append(score)
                 yield Report(len(self.scores[name]), len(views), f"views of {name}")
                 self._heed(trainer.parameters.step)
+        self.scores = {name: scores for name, scores in self.scores.items() if scores}
         self.metrics = {
             "splats": len(splats),
             "loss": self.losses[-1][1],

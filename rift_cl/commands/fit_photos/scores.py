@@ -11,6 +11,7 @@ from __future__ import annotations
 import functools
 import math
 import operator
+import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
@@ -68,16 +69,23 @@ def score_views(
 ) -> Iterator[ViewScore]:
     """Render and score every picture of ``test``.
 
-    ``training`` are the ones that were trained on; without them there are no angles, no distances
-    and no baselines. ``more`` are scores by name besides PSNR and SSIM.
+    What a mask leaves nothing of is left out. ``training`` are the ones that were trained on;
+    without them there are no angles, no distances and no baselines. ``more`` are scores by name
+    besides PSNR and SSIM.
     """
     cameras = (training or test).cameras
     behind, focus, up = test.behind, focus_of(cameras), common_up(cameras)
     for number, camera in enumerate(test.cameras):
+        masks = test.counted(number), test.foreground(number)
+        if masks[0] is not None and not masks[0].any():
+            warnings.warn(
+                f"{test.views[number].name}: its mask is black, so that it is not scored",
+                stacklevel=2,
+            )
+            continue
         drawn = renderer.picture(splats, camera, background=renderer.device.array(behind))
         image = test.shown(drawn.image)
         truth = test.shown(test.over(number, behind))
-        masks = test.counted(number), test.foreground(number)
         values, angle, distance = scores_of(image, truth, masks, "fit", more), math.nan, math.nan
         if training is not None:
             angles = _angles(training.cameras, camera, focus)
