@@ -185,6 +185,9 @@ def test_a_fit_that_is_looked_at_draws_and_gives_the_same_bits(capture, tmp_path
             made.append(self)
 
     def look(line):
+        # So few steps are doubted as well.
+        if not line.startswith("http"):
+            return
         said.append(line)
         pages.append(Wire(dialled(line.split()[0])))
         until(lambda: made[0]._clients)
