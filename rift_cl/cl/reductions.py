@@ -36,7 +36,8 @@ _FAINTEST, _FAR = 1e-30, 80
 def dot(device: Device, x: AnyArray, y: AnyArray) -> float:
     """The inner product of two arrays of the same shape and type, both on the device or the host.
 
-    A NaN or an infinity in either shows in the result, and a product beyond float32 does not.
+    A NaN or an infinity in either shows in the result. Products beyond the range of float32 do no
+    harm.
     """
     found = _reduce(device, x, y, product=True)
     if x.dtype != np.float32 or _FAINTEST < abs(found) < math.inf or not x.size:

@@ -215,6 +215,9 @@ def gathered(words: Sequence[str], settings: type) -> list[str]:
     starts = [index for index, word in enumerate(words) if word.startswith("--")]
     names = [_plain_name(words[start]) for start in starts]
     repeated = {name for name in names if names.count(name) > 1}
+    if not repeated:
+        # What the options are takes time to read, which a command's help has not.
+        return list(words)
     lists = {option.name for option in shown_options(settings) if _is_list(option.kind)} & repeated
     if not lists:
         return list(words)

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from rift_cl.commands.pictures.evenly_spaced import evenly
 from rift_cl.errors import InputError
 from rift_cl.geometry import Camera
-from rift_cl.train.start.points import scene_size
+from rift_cl.train.start.points import pixels_of, scene_size
 
 Floats = NDArray[np.float64]
 
@@ -87,17 +87,12 @@ def _seen(cameras: Sequence[Camera], points: Floats) -> float:
     """The share of the points within each picture, of all pictures the median."""
     shares = []
     for camera in cameras:
-        local = points @ camera.view[:3, :3].T + camera.view[:3, 3]
-        front = local[:, 2] > 0
         if camera.model == "fisheye":
             # Pictures of such lenses may reach round by half a turn.
-            shares.append(front.mean())
-            continue
-        depth = 1.0 if camera.model == "ortho" else np.where(front, local[:, 2], 1.0)
-        fx, fy, cx, cy = camera.intrinsics
-        x, y = fx * local[:, 0] / depth + cx, fy * local[:, 1] / depth + cy
-        inside = (x >= 0) & (x <= camera.width) & (y >= 0) & (y <= camera.height)
-        shares.append((front & inside).mean())
+            inside = points @ camera.view[2, :3] + camera.view[2, 3] > 0
+        else:
+            inside = pixels_of(camera, points)[2]
+        shares.append(inside.mean())
     return float(np.median(shares))
 
 

@@ -48,7 +48,7 @@ def row_doubts(scan: ScanFile, row: int, found: Attenuation) -> list[str]:
     if scan.kind == "attenuation":
         return []
     lines, frames = found.projections[:, 0], scan.read(row, row + 1)
-    told = _frames(frames) or _no_air(scan, lines)
+    told = _frames(frames) or _no_air(scan, lines, frames.flats is not None)
     # Counts over the mean of each view say nothing of the level of the beam.
     if frames.flats is not None or scan.kind == "transmission" or scan.background:
         told = told or _bright(lines, row) or _weak_beam(scan, lines)
@@ -160,7 +160,7 @@ def _weak_beam(scan: ScanFile, lines: Floats) -> list[str]:
     ]
 
 
-def _no_air(scan: ScanFile, lines: Floats) -> list[str]:
+def _no_air(scan: ScanFile, lines: Floats, flats: bool) -> list[str]:
     """Ends that the beam is taken from, and that change against each other from view to view.
 
     The beam of a view is one for both ends, however it changes; what turns is not.
@@ -175,9 +175,9 @@ def _no_air(scan: ScanFile, lines: Floats) -> list[str]:
     most = float(np.ptp(lines))
     if change <= _CHANGE * most:
         return []
+    remedy = "leave out --background" if flats else "give flats, or --flats mean"
     return [
         f"Doubt: the outermost {count} bins at the two ends of the detector, which the beam is "
         f"taken from as air, change against each other by {100 * change / most:.0f} % of the "
-        "largest line integral from view to view: the object reaches into them; give flats, or "
-        "--flats mean."
+        f"largest line integral from view to view: the object reaches into them; {remedy}."
     ]

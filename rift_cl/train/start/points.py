@@ -247,13 +247,13 @@ def _in_hull(
 ) -> NDArray[np.bool_]:
     seen, front = np.zeros(len(points)), np.zeros(len(points))
     for camera, mask in zip(cameras, masks, strict=True):
-        rows, columns, inside = _pixels_of(camera, points)
+        rows, columns, inside = pixels_of(camera, points)
         seen += inside
         front += inside & mask[rows, columns]
     return np.asarray((seen >= _SHARE_OF_VIEWS * len(cameras)) & (front >= _HULL * seen))
 
 
-def _pixels_of(
+def pixels_of(
     camera: Camera, points: Floats
 ) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.bool_]]:
     """Rows and columns of the pixels that points fall on, and whether they fall on the image."""
@@ -270,7 +270,7 @@ def _pixels_of(
 
 def _seen_by(cameras: Sequence[Camera], points: Floats) -> Floats:
     """Fraction of the cameras in whose image each point lies."""
-    seen = sum(_pixels_of(camera, points)[2].astype(float) for camera in cameras)
+    seen = sum(pixels_of(camera, points)[2].astype(float) for camera in cameras)
     return np.asarray(seen / len(cameras))
 
 
