@@ -88,6 +88,20 @@ def test_a_photograph_that_the_object_fills_belongs_to_what_is_cut_out(capture, 
     assert pictures.foreground(1).mean() == pytest.approx(2 / 3)
 
 
+@pytest.mark.parametrize("count", [3, 30])
+def test_a_few_sparse_points_are_not_begun_at_and_that_is_said(capture, tmp_path, capsys, count):
+    sparse = changed(capture, tmp_path / "sparse", lambda _, image: image)
+    record = json.loads((sparse / "transforms.json").read_text())
+    (sparse / "transforms.json").write_text(json.dumps({**record, "ply_file_path": "points.ply"}))
+    places = np.random.default_rng(0).normal(0, 0.3, (count, 3))
+    lines = ["ply", "format ascii 1.0", f"element vertex {count}"]
+    lines += [f"property float {axis}" for axis in "xyz"] + ["end_header"]
+    lines += [" ".join(f"{value:.4f}" for value in place) for place in places]
+    (sparse / "points.ply").write_text("\n".join(lines) + "\n")
+    said = told(sparse, tmp_path / "fit", capsys, "--steps", 5)
+    assert ("3 sparse points are too few to begin at" in said) == (count == 3)
+
+
 @pytest.mark.filterwarnings("always:.*its mask is black")
 @pytest.mark.parametrize("black", [[0], [0, 3, 6]])
 def test_photographs_with_a_black_mask_are_not_scored(capture, tmp_path, capsys, black):

@@ -26,7 +26,7 @@ from rift_cl.commands.fit_photos.report import (
 )
 from rift_cl.commands.fit_photos.scores import error_record, score_record, score_views
 from rift_cl.commands.fit_photos.settings import FitPhotosSettings
-from rift_cl.commands.fit_photos.start import first_splats
+from rift_cl.commands.fit_photos.start import first_splats, start_notes
 from rift_cl.commands.fit_photos.view_split import FEWEST_VIEWS, open_seen, split_views
 from rift_cl.commands.pictures.evenly_spaced import evenly
 from rift_cl.errors import InputError
@@ -267,7 +267,9 @@ class Fit(FitRun[FitPhotosSettings]):
 
     def _split(self, capture: Capture) -> None:
         settings = self.settings
-        self.capture_notes = capture.notes
+        # Poses that are found here come with a sentence of how good they are.
+        few = [] if isinstance(self.source, BareInput) else start_notes(capture)
+        self.capture_notes = (*capture.notes, *few)
         cameras = [view.camera for view in capture.views]
         check_places(cameras, settings.capture)
         check_poses(cameras, capture.points, settings.capture)

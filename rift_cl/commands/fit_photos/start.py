@@ -34,7 +34,7 @@ def first_splats(
 ) -> Parameters:
     """At most ``count`` splats at the capture's points, or ``guessed`` if it has next to none."""
     points, colors = capture.points, capture.point_colors
-    if points is None or len(points) < min(_FEWEST, count):
+    if points is None or len(points) < _FEWEST:
         points, colors = _guessed(pictures, guessed, seed), None
     elif len(points) > count:
         random = np.random.default_rng((seed, 0x901))
@@ -46,6 +46,17 @@ def first_splats(
         seed=seed,
     )
     return Parameters.of(device, raw)
+
+
+def start_notes(capture: Capture) -> list[str]:
+    """A sentence about sparse points that are too few to begin at."""
+    points = capture.points
+    if points is None or not 0 < len(points) < _FEWEST:
+        return []
+    return [
+        f"{len(points)} sparse points are too few to begin at: splats begin as without them (from "
+        f"{_FEWEST} points on they begin there)"
+    ]
 
 
 def _guessed(pictures: CapturePictures, count: int, seed: int) -> Any:
