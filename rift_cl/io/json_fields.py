@@ -84,6 +84,13 @@ class Fields:
             raise self._wrong(name, "a text")
         return value
 
+    def texts(self, name: str) -> list[str]:
+        """A list of texts; errors are those of ``pose``."""
+        values = self.values.get(name)
+        if not (isinstance(values, list) and all(isinstance(value, str) for value in values)):
+            raise self._wrong(name, "a list of texts")
+        return values
+
     def pose(self, name: str) -> NDArray[np.float64]:
         """A rigid motion that is written as a (4, 4) or (3, 4) matrix; float64 (3, 4).
 

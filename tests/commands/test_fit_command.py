@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 
 import numpy as np
 import pytest
@@ -99,3 +100,26 @@ def test_the_ring_is_where_the_capture_says(capture):
         np.testing.assert_allclose(view.camera.view, camera.view, atol=1e-6)
         local = view.camera.view[:3, :3] @ MIDDLE_OF_RING + view.camera.view[:3, 3]
         assert local[2] > 4
+
+
+def test_the_captures_own_lists_are_followed_unless_told_otherwise(capture, tmp_path, capsys):
+    """As nerfstudio would: by 'train_filenames' and 'test_filenames'."""
+    listed = tmp_path / "listed"
+    shutil.copytree(capture, listed)
+    path = listed / "transforms.json"
+    lists = {
+        "train_filenames": [f"{number}.png" for number in range(5)],
+        "test_filenames": ["6.png", "7.png"],
+    }
+    path.write_text(json.dumps(json.loads(path.read_text()) | lists))
+    words = ("--out", tmp_path / "fit", "--steps", "5", "--splats", "50")
+    assert main(["fit", str(listed), *map(str, words)]) == 0
+    assert (
+        "Trained on 5 photographs, and 2 held out, by the capture's own" in capsys.readouterr().err
+    )
+    held_out = json.loads((tmp_path / "fit/metrics.json").read_text())["views"]["held out"]
+    assert [view["name"] for view in held_out] == ["6.png", "7.png"]
+    config = json.loads((tmp_path / "fit/config.json").read_text())
+    assert config["settings"]["hold_out"] is None
+    assert fit(listed, tmp_path / "every", "--dry-run") == 0
+    assert "6 photographs" in capsys.readouterr().out

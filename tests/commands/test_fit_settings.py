@@ -35,6 +35,7 @@ OTHERS = {
     "octaves": 1,
     "color_order": 3,
     "downscale": 2,
+    "hold_out": 3,
     "center": 3.5,
     "pitch": 0.5,
     "noise": 0.5,

@@ -77,13 +77,6 @@ def test_where_masks_are_named_the_folder_says_nothing(tmp_path: Path) -> None:
     assert open_capture(path).notes == ()
 
 
-def test_lists_of_what_is_trained_on_are_not_followed(tmp_path: Path) -> None:
-    path = made.transforms(tmp_path, train_filenames=["images/a.png"], test_filenames=[])
-    found = note(path)
-    assert "'train_filenames', 'test_filenames'" in found and "'val_filenames'" not in found
-    assert "--hold-out" in found and "--test" in found
-
-
 @pytest.mark.parametrize(("cx", "doubted"), [(6.0, False), (4.0, False), (3.0, True), (9.0, True)])
 def test_a_principal_point_far_from_the_middle_is_doubted(
     tmp_path: Path, cx: float, doubted: bool

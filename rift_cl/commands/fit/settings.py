@@ -28,18 +28,6 @@ _FREE = (
 
 
 @dataclass(frozen=True, kw_only=True)
-class SplitOptions:
-    """What is trained on, and what is scored."""
-
-    group: ClassVar[str] = "input"
-
-    hold_out: int = 8
-    """Hold out every Nth view for evaluation (0 = none)."""
-    views: int = 0
-    """Train on this many views, evenly spaced (0 = all)."""
-
-
-@dataclass(frozen=True, kw_only=True)
 class FitOutput:
     """What is written, and when."""
 
@@ -71,7 +59,7 @@ class FitSettings:
         out: Path
         training: TrainSettings
         rendering: SplatSettings
-        hold_out: int
+        hold_out: int | None
         views: int
         checkpoint_every: int
         checkpoint_minutes: float

@@ -27,7 +27,13 @@ from rift_cl.commands.fit_photos.report import (
 from rift_cl.commands.fit_photos.scores import error_record, score_record, score_views
 from rift_cl.commands.fit_photos.settings import FitPhotosSettings
 from rift_cl.commands.fit_photos.start import first_splats, start_notes
-from rift_cl.commands.fit_photos.view_split import FEWEST_VIEWS, open_seen, split_views
+from rift_cl.commands.fit_photos.view_split import (
+    EVERY,
+    FEWEST_VIEWS,
+    follows_lists,
+    open_seen,
+    split_photographs,
+)
 from rift_cl.commands.pictures.evenly_spaced import evenly
 from rift_cl.errors import InputError
 from rift_cl.io.captures.capture import (
@@ -75,6 +81,8 @@ class Fit(FitRun[FitPhotosSettings]):
         self.capture_notes: tuple[str, ...] = ()
         self.training_views: tuple[View, ...] = ()
         self.test_views: tuple[View, ...] = ()
+        # Every so-many-th is held out; None is by the capture's lists.
+        self.hold_out = settings.hold_out
         if isinstance(self.source, Capture):
             self._split(self.source)
         self.tests = {
@@ -188,6 +196,7 @@ class Fit(FitRun[FitPhotosSettings]):
             settings.decided(len(self.training_views)),
             training=trainer.settings,
             rendering=dataclasses.replace(settings.rendering, near=trainer.renderer.settings.near),
+            hold_out=self.hold_out,
             downscale=self.downscale,
             first_splats=settings.first_share,
         )
@@ -273,8 +282,13 @@ class Fit(FitRun[FitPhotosSettings]):
         cameras = [view.camera for view in capture.views]
         check_places(cameras, settings.capture)
         check_poses(cameras, capture.points, settings.capture)
-        hold_out = settings.hold_out if len(cameras) > FEWEST_VIEWS else 0
-        self.training_views, self.test_views = split_views(capture.views, hold_out, settings.views)
+        self.hold_out = settings.hold_out
+        if self.hold_out is None and not follows_lists(capture.views):
+            self.hold_out = EVERY
+        hold_out = self.hold_out if len(cameras) > FEWEST_VIEWS else 0
+        self.training_views, self.test_views = split_photographs(
+            capture.views, hold_out, settings.views
+        )
         decided = self.checkpoints.decided.get("downscale")
         self.downscale = decided or fitting_downscale(self.training_views, self.device)
 
@@ -282,7 +296,12 @@ class Fit(FitRun[FitPhotosSettings]):
         """What was decided about the photographs, and what of them is not used."""
         notes = list(self.source.notes) if isinstance(self.source, BareInput) else []
         notes += self.capture_notes
-        if self.settings.hold_out and not self.test_views:
+        if self.hold_out is None:
+            notes.append(
+                f"Trained on {len(self.training_views)} photographs, and {len(self.test_views)} "
+                "held out, by the capture's own lists; --hold-out 8, say, takes every 8th instead"
+            )
+        if self.hold_out and not self.test_views:
             notes.append(
                 f"None of the {len(self.training_views)} photographs was held out: of so few, each "
                 "is needed"

@@ -9,7 +9,7 @@ from typing import Annotated, Any, ClassVar, Literal
 
 from tyro.conf import Positional
 
-from rift_cl.commands.fit.settings import FitOutput, FitSettings, SplitOptions
+from rift_cl.commands.fit.settings import FitOutput, FitSettings
 from rift_cl.commands.fit_photos.presets import PRESETS
 from rift_cl.commands.options import RepeatableRun
 from rift_cl.errors import InputError
@@ -22,7 +22,7 @@ from rift_cl.train.strategy import DefaultSettings
 
 
 @dataclass(frozen=True, kw_only=True)
-class PhotosInput(SplitOptions):
+class PhotosInput:
     """What is fitted, how it is read, and what of it is scored."""
 
     group: ClassVar[str] = "input"
@@ -32,6 +32,11 @@ class PhotosInput(SplitOptions):
     or a video (mp4, mov, webm)."""
     test: Several[Path] = ()
     """Further captures to score, never trained on. Default: none."""
+    hold_out: Auto[int] = None
+    """Hold out every Nth photograph for evaluation (0 = none). Default: those that the capture
+    lists for it ('val_filenames' and 'test_filenames' of a transforms.json), or every 8th."""
+    views: int = 0
+    """Train on this many photographs, evenly spaced among those not held out (0 = all)."""
     downscale: Auto[int] = None
     """Whole factor by which photographs are downscaled. Default: the least that leaves none above
     1.6 megapixels, or 0.7 on a CPU."""

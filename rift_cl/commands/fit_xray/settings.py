@@ -8,7 +8,7 @@ from typing import Annotated, ClassVar, Literal
 
 from tyro.conf import Positional
 
-from rift_cl.commands.fit.settings import FitOutput, FitSettings, SplitOptions
+from rift_cl.commands.fit.settings import FitOutput, FitSettings
 from rift_cl.commands.options import RepeatableRun
 from rift_cl.io.scans.literals import AngleUnit, Kind
 from rift_cl.option_marks import Auto, AutoExpert, Expert, Short, ShortSplats
@@ -18,13 +18,17 @@ from rift_cl.train.xray.settings import XrayBasisSettings, XrayTrainSettings
 
 
 @dataclass(frozen=True, kw_only=True)
-class XrayInput(SplitOptions):
+class XrayInput:
     """The scan, how it is read, and what of it is scored."""
 
     group: ClassVar[str] = "input"
 
     capture: Annotated[Path, Positional]
     """The scan: every file or folder that 'rift reconstruct' reads."""
+    hold_out: int = 8
+    """Hold out every Nth projection for evaluation (0 = none)."""
+    views: int = 0
+    """Train on this many projections, evenly spaced among those not held out (0 = all)."""
     dataset: Auto[str] = None
     """Name of the projections in the file. Default: that of the file's layout."""
     theta: Auto[str] = None

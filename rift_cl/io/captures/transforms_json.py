@@ -3,7 +3,8 @@
 Intrinsics stand once for all frames or in each of them, where they take precedence. Poses are
 camera-to-world with OpenGL's axes. A lens with an opening has 'aperture_radius', 'focus_distance'
 (without it the focus is at infinity) and 'wavelength', in the poses' unit. Fields that say nothing
-about where and through what lens a photograph was taken are left alone.
+about where and through what lens a photograph was taken are left alone, but for nerfstudio's lists
+of what is trained on and scored.
 """
 
 from __future__ import annotations
@@ -22,14 +23,13 @@ from rift_cl.io.captures.capture_notes import mask_notes
 from rift_cl.io.captures.capture_paths import CaptureFolder, mask_of
 from rift_cl.io.captures.point_cloud import read_point_cloud
 from rift_cl.io.captures.poses import view_of_opengl
+from rift_cl.io.captures.split_lists import split_by_lists
 from rift_cl.io.captures.view import Capture, View, check_views, located
 from rift_cl.io.images.picture_header import read_picture_header
 from rift_cl.io.json_fields import Fields, read_json_object
 
 _COEFFICIENTS = tuple(dict.fromkeys(name for names in LENS_MODELS.values() for name in names))
 _MODELS = ("SIMPLE_PINHOLE", "PINHOLE", *LENS_MODELS)
-# nerfstudio's lists of what is trained on and scored.
-_SPLITS = ("train_filenames", "val_filenames", "test_filenames")
 _ALONG = {"w": "wide", "h": "high"}
 # A principal point this share of the picture from its middle is doubted: that of a picture half as
 # large lies at a quarter, those that calibrations find within a tenth.
@@ -53,10 +53,10 @@ def open_transforms(
     # Where some masks are named, those that are not named are not meant.
     by_name = all(frame.values.get("mask_path") is None for frame in frames)
     views = [_view(place, frame, top, by_name) for frame in frames]
-    checked = check_views(path, views)
+    checked, split_notes = split_by_lists(top, check_views(path, views))
     notes = (
         *(mask_notes(place, checked) if by_name else []),
-        *_split_notes(top),
+        *split_notes,
         *_center_notes(path, checked),
     )
     ply = top.text("ply_file_path")
@@ -64,16 +64,6 @@ def open_transforms(
         return Capture(checked, None, None, path, notes=notes)
     points, colors = read_point_cloud(folder.file(f"{path}: 'ply_file_path'", ply))
     return Capture(checked, points, colors, path, notes=notes)
-
-
-def _split_notes(top: Fields) -> list[str]:
-    named = [name for name in _SPLITS if name in top]
-    if not named:
-        return []
-    return [
-        f"{top.where}: {', '.join(map(repr, named))} are not followed; --hold-out says which "
-        "photographs are held out, and --test names another capture to score"
-    ]
 
 
 def _center_notes(path: Path, views: Sequence[View]) -> list[str]:

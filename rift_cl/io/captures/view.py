@@ -6,6 +6,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -14,6 +15,8 @@ from rift_cl.errors import FileFormatError, InputError, NonFiniteError, RiftErro
 from rift_cl.geometry.camera import Camera
 from rift_cl.geometry.lens_distortion import Lens
 from rift_cl.geometry.numbers import one_number
+
+Split = Literal["", "train", "test", "none"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,6 +31,8 @@ class View:
         lens: what the photograph was distorted by; None where it is a pinhole's already.
         upright: the camera's pixels are those of the photograph as EXIF wants it shown, and not as
             it is stored.
+        split: what the capture wants of it: to be trained on ("train"), to be scored ("test"),
+            neither ("none"); empty where it says nothing.
     """
 
     name: str
@@ -36,6 +41,7 @@ class View:
     mask: Path | None
     lens: Lens | None
     upright: bool = False
+    split: Split = ""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
