@@ -168,6 +168,25 @@ def test_a_wedge_of_a_scan_is_missing_and_its_middle_is_suggested(scan):
     np.testing.assert_allclose(added, [149.6, 134.4, 164.8])
 
 
+def test_a_displaced_detector_shows_more_on_one_side(tmp_path):
+    """Its axis is at bin 20 of 80: it shows a disc of 119 bins, most of it in some views alone."""
+    path = tmp_path / "scan.npz"
+    angles, random = 2 * np.pi * np.arange(360) / 360, np.random.default_rng(0)
+    rows = 0
+    for x, y in random.uniform(-35, 35, (12, 2)):
+        places = np.arange(80) - 20 - (np.cos(angles) * x + np.sin(angles) * y)[:, None]
+        rows = rows + np.exp(-((places / 3) ** 2))
+    np.savez(path, projections=rows[:, None].astype(np.float32), angles=angles)
+    sampled = open_sampled(AnalyzeSettings(path, kind="attenuation"))
+    assert sampled.scan.center == pytest.approx(20, abs=0.1)
+    assert sampled.target.diameter == pytest.approx(119, abs=0.2)
+    assert list(sampled.named_points)[1:] == [
+        f"off the middle, {w}" for w in ("x", "y", "-x", "-y")
+    ]
+    seen = sampled.observations().weight.mean(axis=0)
+    assert seen[0] == 1 and all(0.5 < share < 0.8 for share in seen[1:])
+
+
 def test_a_fan_is_taken_as_it_is():
     angle = 0.7
     fan = Fan([angle], 64, 0.5, 400.0, 600.0, 30.0)

@@ -140,6 +140,9 @@ def test_further_views_are_planned_besides_those_that_were_taken(tmp_path, capsy
     assert len(json.loads((tmp_path / "more" / "transforms.json").read_text())["frames"]) == 2
     np.testing.assert_allclose(found["target"]["center"], [30, -20, 10], atol=1e-4)
     assert "--diameter" not in capsys.readouterr().err
+    # Without a unit it is said how large one makes the place.
+    assert plan(tmp_path / "other", *have[:2], "--views", 1, "--dry-run") == 0
+    assert "is taken to be 1 mm" in capsys.readouterr().out
 
 
 @pytest.mark.full

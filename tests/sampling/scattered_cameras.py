@@ -33,4 +33,4 @@ def changed(camera, *, shift=(0, 0, 0), focal=0.0, radius=0.0, focus=0.0):
     aperture = camera.aperture
     if aperture is not None:
         aperture = Aperture(aperture.radius + radius, aperture.focus + focus, aperture.wavelength)
-    return Camera(camera.size, camera.K + np.diag([focal, 0, 0]), view, camera.model, aperture)
+    return Camera(camera.size, camera.K + np.diag([focal, focal, 0]), view, camera.model, aperture)

@@ -40,6 +40,14 @@ def test_a_point_beside_or_behind_the_picture_has_no_weight(model):
     assert observations.weight[0].tolist() == [1, 0, 0, model == "ortho"]
 
 
+@pytest.mark.parametrize("focal", [(400, 200), (200, 400)])
+def test_of_pixels_that_are_no_squares_the_longer_edge_counts(focal):
+    K = [[focal[0], 0, 50], [0, focal[1], 50], [0, 0, 1]]
+    camera = Camera((100, 100), K, look_at((0, -5, 0), (0, 0, 0), (0, 0, 1)))
+    found = Observations.of([camera], np.zeros((1, 3)))
+    assert found.pixel[0, 0] == pytest.approx(5 / 200)
+
+
 def test_a_parallel_beam_sees_all_points_alike():
     observations = Observations.of(
         [one("ortho", matrix=[[4, 0, 20], [0, 4, 15], [0, 0, 1]])], [[0, 0, 0], [3, 1, 2]]

@@ -124,6 +124,23 @@ def test_a_flat_path_is_blind_along_its_own_normal_however_it_lies():
     assert found.distance == pytest.approx(2, abs=1e-6)
 
 
+@pytest.mark.parametrize("count", [8, 12, 96])
+def test_tuy_hangs_neither_on_how_many_cameras_a_ring_has_nor_on_repeats(count):
+    one, target = ring_of_cameras(count), Target((0, 0, 0), 4.0)
+    found, twice = tuy(one, target), tuy([*one, *one, *one], target)
+    assert not found.satisfied and found.unmet < 0.05
+    assert twice.unmet == found.unmet
+    assert found.unmet == pytest.approx(tuy(ring_of_cameras(200), target).unmet, abs=0.01)
+
+
+def test_cameras_too_far_apart_are_no_path():
+    """Four at right angles, and two groups that face each other, are not joined."""
+    target = Target((0, 0, 0), 1.0)
+    assert tuy(ring_of_cameras(4), target).unmet > 0.9
+    facing = [ring_of_cameras(60)[k] for k in (0, 1, 2, 30, 31, 32)]
+    assert tuy(facing, target).unmet > 0.6
+
+
 def test_one_camera_works():
     one = ring_of_cameras(1)
     assert tuy(one, SPACE).unmet > 0.9 and orlov(one, SPACE).missing > 0.9

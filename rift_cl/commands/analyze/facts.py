@@ -75,7 +75,7 @@ def missing(sampled: ViewSet) -> Findings:
     if not sampled.is_flat and all(camera.model != "ortho" for camera in sampled.cameras):
         planes = tuy(sampled.cameras, target)
         figures["tuy"] = {"unmet": planes.unmet, "tolerance": planes.tolerance}
-        sentences.append(_planes(planes.unmet, f"{planes.tolerance:.3g} {sampled.units}"))
+        sentences.append(_planes(planes.unmet))
     return Findings(figures, (_holes(found, sampled.unit),), tuple(sentences))
 
 
@@ -135,12 +135,13 @@ def _hole(entry: Orlov) -> str:
     )
 
 
-def _planes(unmet: float, near: str) -> str:
+def _planes(unmet: float) -> str:
+    path = "the path through neighbouring cameras"
     if unmet == 0:
-        return f"Tuy's condition is met: every plane through the target has a camera within {near}."
+        return f"Tuy's condition is met: every plane through the target meets {path}."
     return (
-        f"Tuy's condition is not met: {unmet:.1%} of the planes through the target have no camera "
-        f"within {near}."
+        f"Tuy's condition is not met: {unmet:.1%} of the planes through the target do not meet "
+        f"{path}."
     )
 
 

@@ -17,12 +17,13 @@ from rift_cl.commands.inputs.surfaces import trusted
 from rift_cl.commands.inputs.view_set import Floats, ViewSet, points_of
 from rift_cl.commands.options import absolute_paths
 from rift_cl.errors import InputError
-from rift_cl.geometry import Camera, Parallel
+from rift_cl.geometry import Camera, Cone, Parallel, Scan, Vectors
 from rift_cl.geometry.aperture import Aperture
 from rift_cl.geometry.scan_cameras import scan_cameras
 from rift_cl.geometry.seen_grid import scan_lengths, seen_grid
 from rift_cl.io.captures.capture import Capture, capture_name, holds_capture, open_capture
 from rift_cl.io.scans.scan_file import ScanFile
+from rift_cl.reconstruct.direct.offset_axis import sees_further
 from rift_cl.sampling.targets.target import Target
 
 # Share of the sparse points that a target holds.
@@ -192,9 +193,16 @@ def _scaled(camera: Camera, unit: float) -> Camera:
 
 
 def _target(
-    settings: AnalyzeSettings, center: Floats, diameter: float, up: Floats, *, flat: bool
+    settings: AnalyzeSettings,
+    center: Floats,
+    diameter: float,
+    up: Floats,
+    *,
+    flat: bool,
+    lopsided: bool = False,
 ) -> Target:
-    points = np.array(list(points_of(center, diameter, up, flat=flat).values()))
+    named = points_of(center, diameter, up, flat=flat, lopsided=lopsided)
+    points = np.array(list(named.values()))
     if flat:
         return Target.flat(diameter, center, points=points, band=settings.band)
     return Target(center=center, diameter=diameter, points=points, band=settings.band)
@@ -214,7 +222,8 @@ def _scan(settings: AnalyzeSettings) -> tuple[ViewSet, AnalyzeSettings]:
         notes.append("The file gives no detector pitch: lengths are in bins.")
     cameras, scan, edge = _rays(settings, file, pitch, notes)
     center = np.zeros(3) if file.cone is None else np.array(seen_grid(file.cone).center[::-1])
-    diameter = edge * file.shape[2] if settings.diameter is None else settings.diameter
+    across, lopsided = _shown(file.geometry if scan is None else scan)
+    diameter = edge * across if settings.diameter is None else settings.diameter
     if settings.diameter is None:
         notes.append(
             f"The target's diameter, {diameter:.4g} {unit}, is taken to be what the detector shows "
@@ -229,12 +238,13 @@ def _scan(settings: AnalyzeSettings) -> tuple[ViewSet, AnalyzeSettings]:
     )
     sampled = ViewSet(
         name=Path(file.path).name,
-        target=_target(decided, center, diameter, up, flat=file.cone is None),
+        target=_target(decided, center, diameter, up, flat=file.cone is None, lopsided=lopsided),
         up=up,
         unit=unit,
         cameras=cameras,
         scan=scan,
         orbit=file.cone,
+        lopsided=lopsided,
         facts={"projections": file.shape[0], "rows": file.shape[1], "bins": file.shape[2]},
         notes=tuple(notes),
     )
@@ -249,6 +259,16 @@ def _rays(
     if not isinstance(scan, Parallel):
         return scan_cameras(scan).cameras, None, scan_lengths(scan).pixel[1]
     return (), Parallel(file.angles, file.shape[2], pitch, _axis(settings, notes)), pitch
+
+
+def _shown(scan: Scan) -> tuple[float, bool]:
+    """Bins that detectors show across the axis, and whether they do so on one side alone."""
+    if isinstance(scan, Vectors):
+        return scan.bins, False
+    bin = scan.center[1] if isinstance(scan, Cone) else scan.center
+    if not sees_further(bin, scan.bins):
+        return scan.bins, False
+    return 2 * max(bin + 0.5, scan.bins - 0.5 - bin), True
 
 
 def _axis(settings: AnalyzeSettings, notes: list[str]) -> float | None:

@@ -16,7 +16,7 @@ from rift_cl.commands.analyze.settings import AnalyzeSettings
 from rift_cl.commands.analyze.suggestions import angles_to_add, cameras_to_add, usual_distance
 from rift_cl.commands.analyze.surface import surface_missing, surface_resolution
 from rift_cl.commands.inputs.surfaces import sides_of, surface_of
-from rift_cl.commands.inputs.view_set import Floats, ViewSet, place_of, points_of
+from rift_cl.commands.inputs.view_set import Floats, ViewSet, place_of
 from rift_cl.commands.pictures.coverage_pictures import MAP_BYTES
 from rift_cl.commands.pictures.views_table import csv_text, view_row
 from rift_cl.commands.run_folder.run_folder import RunFolder
@@ -192,7 +192,7 @@ def _observed(sampled: ViewSet) -> tuple[ViewSet, dict[str, Floats]]:
     """
     target = sampled.target
     sampled.observations(target.center[None]).check_seen()
-    points = points_of(target.center, target.diameter, sampled.up, flat=sampled.is_flat)
+    points = sampled.named_points
     weight = sampled.observations(np.array(list(points.values()))).weight
     kept = {name: at for (name, at), w in zip(points.items(), weight.T, strict=True) if w.any()}
     notes = sampled.notes

@@ -13,6 +13,7 @@ from rift_cl.geometry import Camera
 from rift_cl.geometry.camera_type import CameraType
 from rift_cl.sampling.planning.constraints import Constraints
 from rift_cl.sampling.planning.planner import next_views
+from rift_cl.sampling.targets.observations import coarser_focal
 
 # Highest elevation that is suggested, in degrees.
 _HIGH = 75.0
@@ -68,17 +69,21 @@ def usual_distance(sampled: ViewSet) -> float:
 def camera_type_of(camera: Camera) -> CameraType:
     """What a camera is, but for its scale: the same field of view, pixels and opening.
 
-    A pinhole's picture says nothing of the size of its sensor; a small one is taken, which is in
-    focus wherever it looks.
+    Pixels that are no squares become squares as long as their longer edge. A pinhole's picture
+    says nothing of the size of its sensor; a small one is taken, which is in focus wherever it
+    looks.
     """
     lens, far = camera.aperture, float(np.linalg.norm(camera.center)) + 1.0
     image = _SHORT * (lens.radius if lens is not None else far)
+    fx, fy = camera.intrinsics[:2]
+    focal = coarser_focal(camera)
+    size = round(camera.height * focal / fy), round(camera.width * focal / fx)
     return CameraType(
         "as at hand",
         focal_length=image,
         f_number=_PINHOLE if lens is None else image / (2 * lens.radius),
-        pixel=image / camera.intrinsics[0],
-        size=camera.size,
+        pixel=image / focal,
+        size=(max(1, size[0]), max(1, size[1])),
         wavelength=0.0 if lens is None else lens.wavelength,
     )
 

@@ -39,6 +39,7 @@ class ViewSet:
         notes: what had to be assumed, a sentence each.
         opaque: whether the target is taken for a surface, and not for what is seen through.
         space: what stands where, as far as the views show it; None where that is not known.
+        lopsided: whether a detector shows much more on one side of the axis than on the other.
     """
 
     name: str
@@ -53,6 +54,7 @@ class ViewSet:
     notes: tuple[str, ...] = ()
     opaque: bool = False
     space: FreeSpace | None = None
+    lopsided: bool = False
 
     @property
     def views(self) -> int:
@@ -82,6 +84,12 @@ class ViewSet:
     def is_flat(self) -> bool:
         """Whether the target is a plane, as the slices of a scan are."""
         return self.target.is_flat
+
+    @property
+    def named_points(self) -> dict[str, Floats]:
+        """The points of the target at which coverage is looked at; see ``points_of``."""
+        target, flat = self.target, self.is_flat
+        return points_of(target.center, target.diameter, self.up, flat=flat, lopsided=self.lopsided)
 
     def observations(self, points: ArrayLike | None = None) -> Observations:
         """How the views see points (P, 3); those of the target when not given."""
@@ -136,8 +144,14 @@ def place_of(target: Target) -> str:
     return "({:.4g}, {:.4g}, {:.4g})".format(*near)
 
 
-def points_of(center: Floats, diameter: float, up: Floats, *, flat: bool) -> dict[str, Floats]:
-    """Points of a target at which coverage is looked at, by what they are called."""
+def points_of(
+    center: Floats, diameter: float, up: Floats, *, flat: bool, lopsided: bool = False
+) -> dict[str, Floats]:
+    """Points of a target at which coverage is looked at, by what they are called.
+
+    Across the axis of a lopsided detector they are on all sides: what one of two opposite points
+    is seen from need not be what the other is seen from.
+    """
     from rift_cl.report.plot.camera_plot import axis_names, upright_frame
 
     frame = upright_frame(up)
@@ -146,4 +160,8 @@ def points_of(center: Floats, diameter: float, up: Floats, *, flat: bool) -> dic
     out = {"middle": center, f"off the middle, {first}": center + step * frame[0]}
     name, way = (second, frame[1]) if flat else (third, frame[2])
     out[f"off the middle, {name}"] = center + step * way
+    if lopsided:
+        for word, across in ((first, frame[0]), (second, frame[1])):
+            out.setdefault(f"off the middle, {word}", center + step * across)
+            out[f"off the middle, -{word}"] = center - step * across
     return out

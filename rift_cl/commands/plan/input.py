@@ -142,7 +142,15 @@ def _have(settings: PlanSettings, path: Path) -> ViewSet:
         unit=settings.unit, mode="surface" if settings.opaque else "volume", device=settings.device,
     )  # fmt: skip
     asked.check()
-    return open_sampled(asked)
+    have = open_sampled(asked)
+    if settings.unit != 1:
+        return have
+    away = [np.linalg.norm(camera.center - have.target.center) for camera in have.cameras]
+    note = (
+        f"One unit of {path} is taken to be 1 mm (--unit): its cameras are {min(away):.3g} to "
+        f"{max(away):.3g} mm away from the target."
+    )
+    return replace(have, notes=(*have.notes, note))
 
 
 def _in_units(settings: PlanSettings) -> tuple[float, float, float] | None:

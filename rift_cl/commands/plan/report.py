@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from rift_cl.cl.device import Device
-from rift_cl.commands.inputs.view_set import ViewSet, points_of
+from rift_cl.commands.inputs.view_set import ViewSet
 from rift_cl.commands.pictures.coverage_pictures import (
     add_coverage,
     camera_figure,
@@ -184,7 +184,6 @@ def _gains(page: Page, found: Plan, diminishing_returns: DiminishingReturns, nam
 
 
 def _coverage(page: Page, sampled: ViewSet, device: Device) -> None:
-    target = sampled.target
     page.section("Coverage")
     page.figure(
         figure_svg(direction_figure(sampled, device)),
@@ -193,5 +192,5 @@ def _coverage(page: Page, sampled: ViewSet, device: Device) -> None:
         "per diameter; hatched directions lie on no view's slice.",
         alt="Hemispheres of lines of sight and of directions of detail",
     )
-    points = points_of(target.center, target.diameter, sampled.up, flat=sampled.is_flat)
+    points = sampled.named_points
     add_coverage(page, sampled, points, device)

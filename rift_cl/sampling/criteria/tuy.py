@@ -1,14 +1,15 @@
 """Tuy's condition: does every plane through the target meet the cameras' path?
 
 It is what rays from points need for an exact reconstruction (Tuy 1983; Smith 1985). One ring of
-cameras does not do; two at right angles do, for a target that is small enough. Cameras are points
-and not a path, so that a plane counts as met where one stands near it. The source of a scanner
-does move along a path, and a plane with views on either side of it is one that it crossed: for
-scans the share of planes that were never crossed is given for every point.
+cameras does not do, however many they are; two at right angles do, for a target that is small
+enough. Cameras are points, so that a path is laid through them: from each to its neighbours, where
+these are not too far apart as the target sees them. Of a scanner, whose source does move along a
+path, the share of planes that it never crossed is given for every point.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -27,18 +28,23 @@ Floats = NDArray[np.float64]
 _NORMALS, _OFFSETS = 1024, 9
 # Planes through a point of which it is counted how many were crossed.
 _CROSSED = 1 << 14
+# Distance up to which a plane counts as met, as a share of the target's diameter.
+_NEAR = 0.01
+# Cosine of the angle between cameras that are too far apart for a path from one to the other, and
+# how many neighbours of each it may lead to.
+_APART, _NEIGHBOURS = math.sqrt(0.5), 8
 
 
 @dataclass(frozen=True, eq=False)
 class Tuy:
-    """Which planes through the target no camera lies near.
+    """Which planes through the target do not meet the path through the cameras.
 
     Args:
         unmet: the share of them.
-        normal: (3,) of the plane that is furthest from all cameras.
+        normal: (3,) of the plane that is furthest from the path.
         offset: of that plane from the target's middle.
-        distance: of that plane from the nearest camera.
-        tolerance: up to which a plane counts as met.
+        distance: of that plane from the path.
+        tolerance: distance up to which a plane counts as met.
     """
 
     unmet: float
@@ -56,23 +62,26 @@ class Tuy:
     def sentence(self) -> str:
         """The finding for a reader."""
         if self.satisfied:
-            return f"Every plane through the target has a camera within {self.tolerance:.3g}."
+            return "Every plane through the target meets the path through neighbouring cameras."
         x, y, z = self.normal + 0.0
         return (
-            f"{self.unmet:.1%} of the planes through the target have no camera within "
-            f"{self.tolerance:.3g}; the loneliest, across ({x:.2f}, {y:.2f}, {z:.2f}), is "
-            f"{self.distance:.3g} away from all."
+            f"{self.unmet:.1%} of the planes through the target do not meet the path through "
+            f"neighbouring cameras; the loneliest, across ({x:.2f}, {y:.2f}, {z:.2f}), is "
+            f"{self.distance:.3g} away from it."
         )
 
 
 def tuy(cameras: Sequence[Camera], target: Target, *, tolerance: float | None = None) -> Tuy:
-    """Tuy's condition: every plane through the target's ball has a camera near it.
+    """Tuy's condition: every plane through the target's ball meets the cameras' path.
+
+    The path goes from camera to camera by the shortest ways that connect them, and not between
+    cameras that the middle of the target sees more than 45 degrees apart.
 
     Args:
         cameras: the views; only where they stand counts.
         target: its middle and diameter.
-        tolerance: how near; the median distance from a camera to its nearest neighbour by default,
-            but a hundredth of the diameter at least.
+        tolerance: distance from the path up to which a plane counts as met; a hundredth of the
+            diameter by default.
 
     Raises:
         InputError: there is no camera, or the tolerance is not positive.
@@ -80,7 +89,7 @@ def tuy(cameras: Sequence[Camera], target: Target, *, tolerance: float | None = 
     if not len(cameras):
         raise InputError("cameras is empty, wanted at least one view")
     places = np.stack([camera.center for camera in cameras]) - target.center
-    near = _spacing(places, target.diameter) if tolerance is None else one_number(tolerance)
+    near = _NEAR * target.diameter if tolerance is None else one_number(tolerance)
     if not near > 0:
         raise InputError(f"tolerance is {tolerance!r}, wanted a positive length")
     # A flat path is blind along its own normal, which no even set of directions hits.
@@ -88,25 +97,49 @@ def tuy(cameras: Sequence[Camera], target: Target, *, tolerance: float | None = 
     own = np.linalg.eigh(spread.T @ spread)[1].T
     normals = np.concatenate([half_sphere(_NORMALS), own])
     offsets = np.linspace(-0.5, 0.5, _OFFSETS) * target.diameter
+    begin, end = _path(places, near)
     distances = np.empty((len(normals), _OFFSETS))
-    for part in runs(len(normals), _OFFSETS * len(places)):
-        heights = normals[part] @ places.T
-        distances[part] = np.abs(heights[:, None] - offsets[:, None]).min(2)
+    for part in runs(len(normals), _OFFSETS * len(begin)):
+        first, last = normals[part] @ begin.T, normals[part] @ end.T
+        low, high = np.minimum(first, last)[:, None], np.maximum(first, last)[:, None]
+        beyond = np.maximum(low - offsets[:, None], offsets[:, None] - high)
+        distances[part] = np.maximum(beyond, 0).min(2)
     worst = np.unravel_index(int(np.argmax(distances)), distances.shape)
     unmet = float((distances > near).mean())
     offset = float(offsets[worst[1]])
     return Tuy(unmet, normals[worst[0]], offset, float(distances[worst]), near)
 
 
-def _spacing(places: Floats, diameter: float) -> float:
-    """Median distance between neighbouring cameras."""
+def _path(places: Floats, near: float) -> tuple[Floats, Floats]:
+    """Both ends (E, 3) of each piece of a path through all places; of lone ones, twice the place.
+
+    Args:
+        places: (V, 3), from the middle of the target.
+        near: places within about this of each other are one.
+    """
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import minimum_spanning_tree
     from scipy.spatial import cKDTree
 
-    least = 0.01 * diameter
-    if len(places) < 2:
-        return least
-    nearest: Floats = cKDTree(places).query(places, k=2)[0][:, 1]
-    return max(least, float(np.median(nearest)))
+    _, kept = np.unique(np.round(places / near), axis=0, return_index=True)
+    places = places[np.sort(kept)]
+    count = len(places)
+    if count < 2:
+        return places, places
+    away, other = cKDTree(places).query(places, k=min(_NEIGHBOURS + 1, count))
+    near_ones = np.repeat(np.arange(count), other.shape[1] - 1), other[:, 1:].ravel()
+    tree = minimum_spanning_tree(
+        coo_array((away[:, 1:].ravel(), near_ones), (count, count)).tocsr()
+    ).tocoo()
+    # The tree of a closed path leaves a gap, which the two nearest of every place close.
+    pairs = np.concatenate(
+        [np.stack([tree.row, tree.col], 1), *(other[:, [0, k]] for k in (1, 2) if k < count)]
+    )
+    begin, end = places[pairs[:, 0]], places[pairs[:, 1]]
+    apart = (begin * end).sum(1)
+    lengths = np.linalg.norm(begin, axis=1) * np.linalg.norm(end, axis=1)
+    joined = apart >= _APART * lengths
+    return np.concatenate([begin[joined], places]), np.concatenate([end[joined], places])
 
 
 def missed_planes(scan: Cone | Vectors, points: ArrayLike) -> Floats:

@@ -8,7 +8,12 @@ from typing import NamedTuple
 import numpy as np
 
 from rift_cl.geometry import Camera
-from rift_cl.sampling.targets.observations import Floats, Observations, ObservationsGradient
+from rift_cl.sampling.targets.observations import (
+    Floats,
+    Observations,
+    ObservationsGradient,
+    coarser_focal,
+)
 
 
 class CameraGradients(NamedTuple):
@@ -53,11 +58,11 @@ def _one(
     camera: Camera, observations: Observations, gradient: ObservationsGradient, view: int
 ) -> tuple[Floats, float, float, float]:
     """Of one camera: by position (3,), focal length, radius, focus."""
-    fx, pixel = camera.intrinsics[0], observations.pixel[view]
+    focal, pixel = coarser_focal(camera), observations.pixel[view]
     # How far away a point counts as, which is a pixel's edge times the focal length.
-    reach = pixel * fx
+    reach = pixel * focal
     by_pixel, by_blur = gradient.pixel[view], gradient.blur[view]
-    by_reach, radius, focus = by_pixel / fx, 0.0, 0.0
+    by_reach, radius, focus = by_pixel / focal, 0.0, 0.0
     if camera.aperture is not None:
         opening, plane = camera.aperture.radius, camera.aperture.focus
         side = 2 * opening * np.sign(1 - reach / plane) * by_blur
@@ -69,7 +74,7 @@ def _one(
             by_reach = by_reach - by_cutoff / reach
         radius /= opening
     position = _by_position(camera, observations, gradient.direction[view], by_reach, view)
-    return position, -float(by_pixel @ pixel) / fx, radius, focus
+    return position, -float(by_pixel @ pixel) / focal, radius, focus
 
 
 def _by_position(
@@ -81,9 +86,9 @@ def _by_position(
     if camera.model == "pinhole":
         ahead = direction @ -camera.view[2, :3]
         # Points beside and behind are not seen, so that nothing hangs on how far off they are.
-        distance = observations.pixel[view] * camera.intrinsics[0] / np.where(ahead > 0, ahead, 1)
+        distance = observations.pixel[view] * coarser_focal(camera) / np.where(ahead > 0, ahead, 1)
         farther = np.broadcast_to(-camera.view[2, :3], direction.shape)
     else:
-        distance, farther = observations.pixel[view] * camera.intrinsics[0], direction
+        distance, farther = observations.pixel[view] * coarser_focal(camera), direction
     across = by_direction - (by_direction * direction).sum(1, keepdims=True) * direction
     return np.asarray((across / distance[:, None] + by_reach[:, None] * farther).sum(0))

@@ -29,7 +29,7 @@ class Observations:
     Args:
         direction: (V, P, 3) unit vectors along the lines of sight, from the point to the camera.
         weight: (V, P) relative photons; 0 where the point is outside the picture or behind.
-        pixel: (V, P) edge of a pixel in object space; 0 for none.
+        pixel: (V, P) edge of a pixel in object space, the longer where its two differ; 0 for none.
         cutoff: (V, P) incoherent cut-off of diffraction; inf for none.
         blur: (V, P) diameter of the disc of defocus in object space.
 
@@ -209,7 +209,7 @@ class _Sight(NamedTuple):
 
 def _sight(camera: Camera, points: Floats) -> _Sight:
     local = points @ camera.view[:3, :3].T + camera.view[:3, 3]
-    depth, fx = local[:, 2], camera.intrinsics[0]
+    depth = local[:, 2]
     ahead = depth > 0
     if camera.model == "ortho":
         direction = np.broadcast_to(-camera.view[2, :3], points.shape)
@@ -233,7 +233,14 @@ def _sight(camera: Camera, points: Floats) -> _Sight:
     cutoff, blur = np.full(len(points), np.inf), np.zeros(len(points))
     if camera.aperture is not None:
         cutoff, blur = camera.aperture.cutoff(reach), camera.aperture.blur(reach)
-    return _Sight(direction, observed.astype(np.float64), reach / fx, cutoff, blur)
+    return _Sight(
+        direction, observed.astype(np.float64), reach / coarser_focal(camera), cutoff, blur
+    )
+
+
+def coarser_focal(camera: Camera) -> float:
+    """Focal length in pixels along the axis of the picture that resolves less."""
+    return float(min(camera.intrinsics[:2]))
 
 
 def _inside(camera: Camera, flat: Floats) -> NDArray[np.bool_]:
