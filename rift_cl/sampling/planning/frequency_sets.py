@@ -7,14 +7,15 @@ the target came with stay, and so do those of a surface.
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 import numpy as np
 
-from rift_cl.sampling.targets.target import Target, half_ball, half_disc
+from rift_cl.sampling.targets.target import Target, ball_of, disc_of, half_ball, half_disc
 
 # How many more than a target has by itself to plan with, and to judge with.
-_FINER, _JUDGED = 4, 5
+_FINER, _JUDGED = 4, 10
 # Bytes that candidates' coverage may take for the sake of more frequencies.
 _MEMORY = 250e6
 
@@ -35,20 +36,13 @@ def for_planning(target: Target, candidates: int) -> Target:
 
 
 def for_judging(target: Target, planned: Target) -> Target:
-    """The target at frequencies of which none was planned with.
+    """The target at frequencies that have nothing in common with those that were planned with.
 
     Args:
         target: that is asked about.
         planned: the same as ``for_planning`` made it.
     """
-    if not _open(target):
-        return planned
-    count = _JUDGED * len(target.k)
-    if target.is_flat:
-        return replace(target, frequencies=half_disc(target.highest, count))
-    # Points of the half ball continue those before them.
-    k = half_ball(target.highest, len(planned.k) + count)[len(planned.k) :]
-    return replace(target, frequencies=k)
+    return _scattered(target, planned, seed=1)
 
 
 def for_choosing(target: Target, planned: Target) -> Target:
@@ -57,15 +51,24 @@ def for_choosing(target: Target, planned: Target) -> Target:
     Between plans that were fitted to the first, and arrangements that were not, the last may not
     choose, if they are to judge.
     """
+    return _scattered(target, planned, seed=2)
+
+
+def _scattered(target: Target, planned: Target, *, seed: int) -> Target:
+    """The target at points of Sobol's sequence, shifted round the edges.
+
+    Further points of the lattices that are planned with would not do: a regular arrangement that
+    avoids the first misses their continuation as well.
+    """
+    from scipy.stats import qmc
+
     if not _open(target):
         return planned
-    count = _JUDGED * len(target.k)
-    if target.is_flat:
-        return replace(target, frequencies=half_disc(target.highest, count + len(target.k)))
-    return replace(
-        target,
-        frequencies=half_ball(target.highest, len(planned.k) + 2 * count)[len(planned.k) + count :],
-    )
+    power = math.ceil(math.log2(_JUDGED * len(target.k)))
+    dim, fill = (2, disc_of) if target.is_flat else (3, ball_of)
+    places = qmc.Sobol(dim, scramble=False).random_base2(power)
+    shift = np.random.default_rng(seed).uniform(size=dim)
+    return replace(target, frequencies=fill(target.highest, np.mod(places + shift, 1)))
 
 
 def _open(target: Target) -> bool:

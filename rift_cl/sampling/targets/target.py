@@ -154,17 +154,27 @@ class Target:
 def half_ball(band: float, count: int = _IN_SPACE) -> Floats:
     """Frequencies that fill the half-ball kz > 0 of a radius evenly, (count, 3)."""
     i = np.arange(1, count + 1)[:, None]
-    radius, height, turn = np.mod(0.5 + i * _STEPS_3D, 1).T
-    across = np.sqrt((1 - height) * (1 + height))
-    unit = [across * np.cos(2 * np.pi * turn), across * np.sin(2 * np.pi * turn), height]
-    return np.asarray(band * np.cbrt(radius) * np.stack(unit)).T.copy()
+    return ball_of(band, np.mod(0.5 + i * _STEPS_3D, 1))
 
 
 def half_disc(band: float, count: int = _IN_PLANE) -> Floats:
     """Frequencies that fill the half-disc ky > 0, kz = 0 evenly, (count, 3)."""
     i = np.arange(count)
-    radius, turn = np.sqrt((i + 0.5) / count), np.mod((i + 1) * _GOLDEN, 1)
-    unit = [np.cos(np.pi * turn), np.sin(np.pi * turn), np.zeros(count)]
+    return disc_of(band, np.stack([(i + 0.5) / count, np.mod((i + 1) * _GOLDEN, 1)], axis=1))
+
+
+def ball_of(band: float, places: Floats) -> Floats:
+    """Points (n, 3) of the unit cube on the half-ball kz > 0 of a radius, equal volumes alike."""
+    radius, height, turn = places.T
+    across = np.sqrt((1 - height) * (1 + height))
+    unit = [across * np.cos(2 * np.pi * turn), across * np.sin(2 * np.pi * turn), height]
+    return np.asarray(band * np.cbrt(radius) * np.stack(unit)).T.copy()
+
+
+def disc_of(band: float, places: Floats) -> Floats:
+    """Points (n, 2) of the unit square on the half-disc ky > 0, kz = 0, equal areas alike."""
+    radius, turn = np.sqrt(places[:, 0]), places[:, 1]
+    unit = [np.cos(np.pi * turn), np.sin(np.pi * turn), np.zeros(len(places))]
     return np.asarray(band * radius * np.stack(unit)).T.copy()
 
 
