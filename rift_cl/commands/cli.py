@@ -224,12 +224,14 @@ def _earlier(name: str, arguments: Sequence[str]) -> Any:
         return None
     from rift_cl.commands.run_folder.saved_settings import (
         begun_settings,
+        changes_a_run,
         named_config,
         named_preset,
     )
 
     given = named_config(arguments), named_preset(arguments)
-    return begun_settings(*given, name, COMMANDS[name].settings_class())
+    anew = changes_a_run(arguments)
+    return begun_settings(*given, name, COMMANDS[name].settings_class(), anew=anew)
 
 
 def _devices(settings: Any, output: Output) -> None:

@@ -35,6 +35,7 @@ from rift_cl.commands.results import (
 from rift_cl.commands.run_folder.run_folder import released
 from rift_cl.commands.run_folder.saved_settings import (
     begun_settings,
+    differing,
     parsed_settings,
     saved_settings,
 )
@@ -360,7 +361,11 @@ def _settings(given: dict[str, Any], job: str, settings: type[S]) -> S:
     config, preset = plain.pop("config", None), plain.get("preset")
     path = None if config is None else Path(config)
     earlier = begun_settings(path, preset, job, settings)
-    return parsed_settings(plain, job, settings, earlier=earlier)
+    found = parsed_settings(plain, job, settings, earlier=earlier)
+    if path is None or not differing(earlier, found):
+        return found
+    anew = begun_settings(path, preset, job, settings, anew=True)
+    return parsed_settings(plain, job, settings, earlier=anew)
 
 
 def _plain(value: Any) -> Any:

@@ -86,8 +86,9 @@ class RepeatableRun(RunOptions):
     group: ClassVar[str] = "run"
 
     config: Auto[Path] = None
-    """config.json of an earlier run of this command. Its settings, with every value that was
-    decided in that run, become the defaults of this one."""
+    """config.json of an earlier run of this command, which is repeated with every value that was
+    decided in it. With further options, the options of that run become the defaults of this one,
+    and what was left open is decided anew."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -141,7 +142,7 @@ class SpreadRun(ResumableRun):
 S = TypeVar("S")
 
 # Options that take a file or a text, besides those that are paths.
-_MAY_BE_FILES = "theta", "flats", "darks"
+MAY_BE_FILES = "theta", "flats", "darks"
 
 
 def absolute_paths(settings: S) -> S:
@@ -160,7 +161,7 @@ def absolute_files(settings: S) -> S:
     """As ``absolute_paths``, and of options that take a file or a text too, where it is a file."""
     changed = {
         name: str(Path(value).absolute())
-        for name in _MAY_BE_FILES
+        for name in MAY_BE_FILES
         if (value := getattr(settings, name, None)) is not None and Path(value).exists()
     }
     return replace(absolute_paths(settings), **changed)  # type: ignore[type-var]

@@ -65,6 +65,63 @@ def test_options_win_over_the_configuration(first, tmp_path):
     assert settings["center"] == config_of(first)["settings"]["center"]
 
 
+@pytest.fixture(scope="module")
+def in_millimetres(scan, tmp_path_factory):
+    """A run of one slice that was told its pitch."""
+    out = tmp_path_factory.mktemp("millimetres") / "out"
+    options = ("--rows", 1, 2, "--center", 45, "--pitch", 0.05, "--unit", "mm")
+    assert run("reconstruct", scan.integrals, "--out", out, *options) == 0
+    return out
+
+
+@pytest.mark.parametrize(
+    ("options", "voxel", "width", "value"),
+    [
+        (("--pitch", 50, "--unit", "um"), 50, 96, 1e-3),
+        (("--binning", 2), 0.1, 48, 1),
+        (("--pixel", 0.1), 0.1, 48, 1),
+    ],
+)
+def test_what_follows_from_a_changed_option_is_decided_anew(
+    in_millimetres, tmp_path, options, voxel, width, value
+):
+    """Samples in millimetres are none in micrometres."""
+    config = ("--config", in_millimetres / "config.json")
+    assert run("reconstruct", *config, "--out", tmp_path / "out", *options) == 0
+    assert config_of(tmp_path / "out")["settings"]["pixel"] == pytest.approx(voxel)
+    assert config_of(tmp_path / "out")["settings"]["center"] == 45
+    before, now = (read_volume(path / "slices") for path in (in_millimetres, tmp_path / "out"))
+    assert now.shape[1:] == (width, width)
+    assert now.max() == pytest.approx(value * before.max(), rel=0.25)
+
+
+def test_another_method_has_no_filter_left_over(in_millimetres, tmp_path, capsys):
+    tv, fbp, again = (tmp_path / name for name in ("tv", "fbp", "again"))
+    config = ("--config", in_millimetres / "config.json")
+    assert run("reconstruct", *config, "--method", "tv", "--steps", 3, "--out", tv) == 0
+    settings = config_of(tv)["settings"]
+    assert (settings["method"], settings["filter"], settings["center"]) == ("tv", None, 45)
+    # What was given stays, and is refused where it has no meaning; a repeated run decided nothing.
+    assert run("reconstruct", "--config", tv / "config.json", "--method", "fbp", "--out", fbp) == 3
+    assert "--steps" in capsys.readouterr().err
+    assert run("reconstruct", *config, "--out", again) == 0
+    assert config_of(again)["asked"] == config_of(in_millimetres)["asked"]
+    config = ("--config", again / "config.json")
+    assert run("reconstruct", *config, "--method", "cgls", "--out", fbp) == 0
+
+
+def test_in_python_too_and_of_a_file_that_was_edited(in_millimetres, scan, tmp_path):
+    given = {"config": in_millimetres / "config.json", "progress": False}
+    found = rift.reconstruct_scan(scan.integrals, tmp_path / "out", binning=2, **given)
+    assert found.settings.pixel == pytest.approx(0.1)
+    record = config_of(in_millimetres)
+    record["settings"]["size"] = 40
+    given["config"] = tmp_path / "config.json"
+    given["config"].write_text(json.dumps(record))
+    found = rift.reconstruct_scan(scan.integrals, tmp_path / "edited", filter="hann", **given)
+    assert (found.settings.size, found.settings.filter) == (40, "hann")
+
+
 def test_steps_are_recorded(scan, tmp_path):
     out = tmp_path / "out"
     options = ("--method", "cgls", "--precondition", "ramp", "--center", 45)

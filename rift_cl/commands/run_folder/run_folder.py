@@ -21,7 +21,16 @@ from typing import Any
 
 from rift_cl import __version__
 from rift_cl.cl.device import Device
-from rift_cl.commands.run_folder.saved_settings import LOADED, options_of, record_of
+from rift_cl.commands.options import MAY_BE_FILES
+from rift_cl.commands.run_folder.saved_settings import (
+    ASKED,
+    DIGEST,
+    LOADED,
+    asked_before,
+    digest_of,
+    options_of,
+    record_of,
+)
 from rift_cl.errors import CheckpointError, InputError, OutputError
 from rift_cl.io.folder_lock import LOCK_NAME, keep, let_go
 from rift_cl.io.json_fields import read_json_object
@@ -33,8 +42,6 @@ from rift_cl.report.html_page import Page
 _CONFIG = "config.json"
 # Says of an unfinished run that nothing of an earlier one is left.
 _CLEARED = "cleared"
-# Texts that name a file or a folder, or a part of the scan.
-_MAY_BE_FILES = ("theta", "flats", "darks")
 # Settings that change nothing of what comes out.
 _FREE = (
     *("cluster", "config", "device", "dry_run", "out", "overwrite", "part_timeout", "resume"),
@@ -263,14 +270,15 @@ class RunFolder:
             asked: the settings that were given, where ``settings`` holds what was decided too.
             **decided: what else the configuration is to hold, by name.
         """
-        given = {} if asked is None else {"asked": _changed(asked)}
+        given = {} if asked is None else {ASKED: _changed(asked)}
         given |= {} if self._read is None else {"read": self._read}
         given |= {LOADED: loaded} if (loaded := loaded_parts()) else {}
         config = {
             "job": self._job,
             "complete": True,
             "rift_cl": __version__,
-            "settings": record_of(settings),
+            "settings": (record := parse_json(json_text(record_of(settings)))),
+            DIGEST: digest_of(record),
             **given,
             **decided,
             "environment": environment(device),
@@ -357,7 +365,7 @@ def files_read(settings: Any) -> Iterator[Path]:
         if option.name in _FREE:
             continue
         several = option.value if isinstance(option.value, tuple) else (option.value,)
-        kinds: Any = (str, os.PathLike) if option.name in _MAY_BE_FILES else os.PathLike
+        kinds: Any = (str, os.PathLike) if option.name in MAY_BE_FILES else os.PathLike
         yield from (Path(value) for value in several if isinstance(value, kinds))
 
 
@@ -414,7 +422,10 @@ def _show_settings(page: Page, settings: Any, asked: Any = None) -> None:
 
 
 def _changed(settings: Any) -> dict[str, Any]:
-    """The settings that differ from their defaults, by name."""
+    """The settings that were given, by name: of a run that is repeated, those of the first."""
+    before = asked_before(settings)
+    if before is not None:
+        return before
     return {
         option.name: _whole(option.value)
         for option in options_of(settings)

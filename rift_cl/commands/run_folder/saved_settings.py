@@ -9,9 +9,11 @@ from __future__ import annotations
 
 import dataclasses
 import difflib
+import hashlib
 import types
 import warnings
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import Annotated, Any, Literal, NamedTuple, TypeVar, Union, get_args, get_origin
 from typing import get_type_hints as type_hints
@@ -19,8 +21,8 @@ from typing import get_type_hints as type_hints
 import tyro
 
 from rift_cl import __version__
-from rift_cl.commands.options import KIND, MISSING, default_of, kinds_of, option_name
-from rift_cl.errors import InputError, SettingError
+from rift_cl.commands.options import KIND, MAY_BE_FILES, MISSING, default_of, kinds_of, option_name
+from rift_cl.errors import InputError, RiftError, SettingError
 from rift_cl.own_parts import loaded_parts
 
 S = TypeVar("S")
@@ -28,10 +30,13 @@ S = TypeVar("S")
 _NOT_REPEATED = (
     *("cluster", "config", "dry_run", "overwrite", "part_timeout", "preview", "resume", "view"),
 )
+# Those that leave what is repeated as it was, and words of a command line with no value after them.
+_FREE = (*_NOT_REPEATED, "device", "memory", "out", "quiet")
+_SWITCHES = ("dry_run", "overwrite", "quiet", "resume", "view")
 
-
-# Of config.json: what --load ran, by name, with hashes.
-LOADED = "loaded"
+# Of config.json: what --load ran, by name, with hashes; the options that were given; and a digest
+# of the settings, which tells whether they were edited since.
+LOADED, ASKED, DIGEST = "loaded", "asked", "digest"
 
 
 class Option(NamedTuple):
@@ -107,13 +112,38 @@ def named_config(arguments: Sequence[str]) -> Path | None:
     return None if found is None else Path(found)
 
 
-def saved_settings(path: Path, job: str, settings: type[S]) -> S:
+def changes_a_run(arguments: Sequence[str]) -> bool:
+    """Whether words beside ``--config`` change what the run was asked for, and not only its place.
+
+    Args:
+        arguments: of the command line, after the command.
+    """
+    before = ""
+    for word in arguments:
+        name = word.removeprefix("--").partition("=")[0].replace("-", "_")
+        if word.startswith("--") and name.removeprefix("no_") not in _FREE:
+            return True
+        # What stands alone is what the command works on.
+        if not word.startswith("-") and (not before.startswith("-") or _is_switch(before)):
+            return True
+        before = word
+    return False
+
+
+def _is_switch(word: str) -> bool:
+    name = word.removeprefix("--").replace("-", "_").removeprefix("no_")
+    return "=" in word or name in _SWITCHES
+
+
+def saved_settings(path: Path, job: str, settings: type[S], *, anew: bool = False) -> S:
     """The settings of an earlier run.
 
     Args:
         path: its config.json.
         job: the command that is to be run again, such as "reconstruct".
         settings: the command's settings.
+        anew: as the run was asked for, without what it decided: options beside them may call for
+            other decisions. A file that was edited is taken as it stands.
 
     Raises:
         InputError: the file cannot be read, is another command's or another version's, or holds a
@@ -141,7 +171,56 @@ def saved_settings(path: Path, job: str, settings: type[S]) -> S:
     where = f"--config {path}: 'rift {job}'"
     saved = _read_tree(settings, None, repeated, where, open_ended=True)
     _check_saved(saved, where)
-    return saved
+    asked = record.get(ASKED)
+    if not (anew and isinstance(asked, dict) and record.get(DIGEST) == digest_of(values)):
+        return saved
+    # Of what may be a file, the run noted where it was.
+    files = {name: getattr(saved, name) for name in asked if name in MAY_BE_FILES}
+    given = {name: value for name, value in asked.items() if name not in _NOT_REPEATED}
+    return parsed_settings(
+        {**given, **files}, job, settings, where=f"--config {path}: ", open_ended=True
+    )
+
+
+def digest_of(values: Any) -> str:
+    """A digest of settings, as ``config.json`` holds them."""
+    from rift_cl.io.output import json_text
+
+    return hashlib.sha256(json_text(values).encode()).hexdigest()[:16]
+
+
+def asked_before(settings: Any) -> dict[str, Any] | None:
+    """What the run was asked for that settings repeat (``--config``), unless they change it."""
+    path = getattr(settings, "config", None)
+    if path is None:
+        return None
+    from rift_cl.io.json_fields import read_json_object
+
+    with suppress(RiftError, LookupError):
+        record = read_json_object(path).values
+        saved = saved_settings(path, record["job"], type(settings))
+        if not differing(saved, settings):
+            asked = record[ASKED]
+            return asked if isinstance(asked, dict) else None
+    return None
+
+
+def differing(one: Any, other: Any) -> list[str]:
+    """The names of options that decide what comes out, and whose values in two trees differ."""
+    values, others = (
+        {option.name: _whole(option.value) for option in options_of(tree)} for tree in (one, other)
+    )
+    return [
+        name
+        for name in {**values, **others}
+        if name not in _FREE and values.get(name, MISSING) != others.get(name, MISSING)
+    ]
+
+
+def _whole(value: Any) -> Any:
+    if isinstance(value, Path):
+        return value.absolute()
+    return tuple(map(_whole, value)) if isinstance(value, tuple) else value
 
 
 def _doubt_parts(before: Any, path: Path) -> None:
@@ -178,7 +257,7 @@ def named_preset(arguments: Sequence[str]) -> str | None:
 
 
 def begun_settings(
-    config: Path | None, preset: str | None, job: str, settings: type[S]
+    config: Path | None, preset: str | None, job: str, settings: type[S], *, anew: bool = False
 ) -> S | None:
     """The settings that a command begins with, and its options override.
 
@@ -187,6 +266,7 @@ def begun_settings(
         preset: name of a preset of the command's, or None.
         job: the command.
         settings: its settings.
+        anew: whether the run is begun with as it was asked for; see ``saved_settings``.
 
     Returns:
         None if the defaults are meant.
@@ -201,7 +281,7 @@ def begun_settings(
             "one of the two"
         )
     if config is not None:
-        return saved_settings(config, job, settings) if "config" in takes else None
+        return saved_settings(config, job, settings, anew=anew) if "config" in takes else None
     return None if preset is None else _preset_settings(preset, job, settings)
 
 

@@ -56,7 +56,7 @@ def variations(sweep: SweepSettings) -> list[Variation]:
         raise InputError(f"{twice} is given twice: once in --vary or once in --fixed is enough")
     fixed = {name: _one(name, values) for name, values in named[: len(sweep.fixed)]}
     varied = dict(named[len(sweep.fixed) :])
-    earlier = begun_settings(sweep.base, fixed.get("preset"), job, kind)
+    earlier = begun_settings(sweep.base, fixed.get("preset"), job, kind, anew=True)
     inputs: Sequence[Path | None] = sweep.inputs or [None]
     count = len(inputs)
     for several_values in varied.values():
