@@ -6,6 +6,7 @@ import math
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rift_cl.geometry.cone import Cone
 from rift_cl.geometry.fan import Fan
@@ -17,6 +18,10 @@ from rift_cl.geometry.vectors import Vectors
 _BESIDE = 4
 # Least cosine of the angle to a direction along which a detector's edge, or a view, mostly is.
 _MOSTLY = math.sqrt(0.5)
+# What differs by no more than rounding is the same.
+_SAME = 1e-9
+
+Floats = NDArray[np.float64]
 
 
 class ScanLengths(NamedTuple):
@@ -49,12 +54,29 @@ def scan_lengths(scan: Fan | Cone | Vectors) -> ScanLengths:
         normal = np.cross(scan.across, scan.down)
         normal /= np.linalg.norm(normal, axis=1, keepdims=True)
         to_detector = np.abs(((scan.middle - scan.source) * normal).sum(axis=1))
-        to_axis = np.hypot(scan.source[:, 0], scan.source[:, 1])
+        to_axis = to_detector * _share_to_axis(scan, normal)
+        beside = np.hypot(scan.source[:, 0], scan.source[:, 1])
+        # Of upright views that look straight at the axis it is this, to the bit.
+        to_axis = np.where(np.isclose(to_axis, beside, rtol=_SAME, atol=0), beside, to_axis)
         pitch = [np.median(np.linalg.norm(v, axis=1)) for v in (scan.down, scan.across)]
         lengths = float(np.median(to_axis)), float(np.median(to_detector))
         return ScanLengths(*lengths, (float(pitch[0]), float(pitch[1])))
     pitch_of = scan.pitch if isinstance(scan, Cone) else (scan.pitch, scan.pitch)
     return ScanLengths(scan.source_to_axis, scan.source_to_detector, pitch_of)
+
+
+def _share_to_axis(scan: Vectors, normal: Floats) -> Floats:
+    """How far along its rays each view meets the axis, as a share of the way to the detector.
+
+    Where the plane through the axis that faces the detector, upright, cuts them. Of views that look
+    along the axis it is where they meet the plane z = 0.
+    """
+    flat = normal * [1, 1, 0]
+    way = ((scan.middle - scan.source) * flat).sum(axis=1)
+    along = (flat * flat).sum(axis=1) < _SAME
+    height = np.where(along, (scan.middle - scan.source)[:, 2], 1)
+    share = -(scan.source * flat).sum(axis=1) / np.where(along, 1, way)
+    return np.asarray(np.abs(np.where(along, -scan.source[:, 2] / height, share)))
 
 
 def seen_grid(scan: Fan | Cone | Vectors, spacing: float | None = None) -> Grid:

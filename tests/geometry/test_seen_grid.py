@@ -41,6 +41,36 @@ def test_vectors_of_a_cone_see_what_the_cone_sees():
         np.testing.assert_allclose(scan_lengths(cone.vectors()).pixel, scan_lengths(cone).pixel)
 
 
+@pytest.mark.parametrize("tilt", [0.0, 10.0, 30.0, 60.0, 90.0])
+def test_a_source_above_the_plane_sees_what_one_in_it_sees(tilt):
+    """Laminography: the source stands on a circle above, the detector faces it."""
+    angles, up = np.arange(24) * np.pi / 12, np.radians(tilt)
+    ring, flat = np.stack([np.sin(angles), -np.cos(angles), 0 * angles], 1), 0 * angles[:, None]
+    toward = np.concatenate([np.cos(up) * ring[:, :2], flat + np.sin(up)], axis=1)
+    across = np.stack([np.cos(angles), np.sin(angles), 0 * angles], 1)
+    scan = rift.Vectors(200 * toward, -50 * toward, across, np.cross(across, -toward), 48, 40)
+    assert scan_lengths(scan).source_to_axis == pytest.approx(200)
+    assert scan_lengths(scan).pixel == pytest.approx((0.8, 0.8))
+    grid = seen_grid(scan)
+    assert grid.center == pytest.approx((0, 0, 0), abs=1e-9)
+    assert grid.spacing == pytest.approx((0.8, 0.8, 0.8))
+    assert min(grid.shape) >= 40
+
+
+@pytest.mark.parametrize("turn", [0.1, -0.3])
+def test_a_detector_that_faces_aside_or_up_leaves_the_axis_where_it_is(turn):
+    straight = rift.Cone(np.arange(24) * np.pi / 12, 40, 48, 1.0, 200, 250).vectors()
+    facing = np.cross(straight.across, straight.down)
+    for across, down in (
+        (np.cos(turn) * straight.across + np.sin(turn) * facing, straight.down),
+        (straight.across, np.cos(turn) * straight.down + np.sin(turn) * facing),
+    ):
+        turned = rift.Vectors(straight.source, straight.middle, across, down, 40, 48)
+        lengths = scan_lengths(turned)
+        share = lengths.source_to_axis / lengths.source_to_detector
+        assert share == pytest.approx(0.8, rel=1e-9)
+
+
 def test_a_detector_on_its_side_is_as_high_as_it_is_long():
     seen = rift.Cone(ANGLES, 9, 16, 0.8, 50, 100, (1.0, 3.5)).vectors()
     lying = rift.Vectors(seen.source, seen.middle, seen.down, seen.across, 16, 9)
