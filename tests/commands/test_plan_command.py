@@ -129,6 +129,18 @@ def test_the_same_seed_gives_the_same_plan_and_replaces_one_only_on_demand(
 
 
 @pytest.mark.full
+def test_no_camera_stoops_to_see_the_underside(tmp_path):
+    """Nobody stands below the horizon, so that sides that face down are nobody's to show."""
+    words = ("--mode", "surface", "--views", 8, "--diameter", 60)
+    assert plan(tmp_path / "out", *words) == 0
+    frames = json.loads((tmp_path / "out" / "transforms.json").read_text())["frames"]
+    ways = np.array([frame["transform_matrix"] for frame in frames])[:, :3, 3]
+    heights = ways[:, 2] / np.linalg.norm(ways, axis=1)
+    assert np.median(heights) > np.sin(np.radians(25))
+    assert heights.max() > np.sin(np.radians(50))
+
+
+@pytest.mark.full
 def test_further_views_are_planned_besides_those_that_were_taken(tmp_path, capsys):
     (tmp_path / "ring").mkdir()
     taken = transforms_of(ring(6), [f"{k}.png" for k in range(6)])

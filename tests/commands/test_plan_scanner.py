@@ -48,6 +48,19 @@ def on_orbit(cone, tmp_path_factory):
     return out
 
 
+def test_a_scan_is_read_as_options_say(tmp_path, capsys):
+    """Its angles are degrees, and over so short an arc nothing tells."""
+    path = tmp_path / "short.npz"
+    lengths = {"source_to_axis": R, "source_to_detector": S, "pitch": PITCH}
+    angles = np.rad2deg(SEEN) / 20
+    np.savez(path, frames=np.ones((len(SEEN), ROWS, BINS), np.float32), turn=angles, **lengths)
+    words = ("--dataset", "frames", "--theta", "turn", "--angle-unit", "degrees", "--dry-run")
+    assert plan(path, tmp_path / "out", *words) == 0
+    for have in ((), ("--have", tmp_path)):
+        assert main(["plan", "--views", "3", "--angle-unit", "degrees", *map(str, have)]) == 3
+        assert "--angle-unit applies to" in capsys.readouterr().err or have
+
+
 def test_views_on_the_orbit_fill_the_widest_gap(on_orbit):
     """Sources were at azimuths from -90 to 22 degrees, and opposite ones are as good."""
     for view in views_of(on_orbit):

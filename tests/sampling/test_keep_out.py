@@ -72,6 +72,30 @@ def test_a_body_hides_the_target_where_a_point_of_the_line_of_sight_lies_in_it(s
         assert clearance[0] <= along + 1e-9
 
 
+@given(st.integers(0, 10_000))
+@settings(max_examples=25, deadline=None)
+def test_beside_a_body_a_ball_about_the_target_is_seen_whole(seed):
+    """By the narrowest place of the cone from the camera to the ball; slopes by differences."""
+    random = np.random.default_rng(seed)
+    place, center, way = random.uniform(-9, 9, (3, 3))
+    share = np.linspace(0, 1, 2001)[:, None]
+    for shape in SHAPES.values():
+        body = KeepOut(shape, hides=True)
+        free = max(float(shape.distance(center[None])[0][0]), 0.0)
+        for radius in (1.0, 50.0):
+            clearance, slope = body.clearance(place[None], center, radius)
+            along = shape.distance(place + share * (center - place))[0]
+            least = (along - min(radius, free) * share[:, 0]).min()
+            assert clearance[0] == pytest.approx(least, abs=0.01)
+            assert clearance[0] <= least + 1e-9
+        here, slope = body.clearance(place[None], center, 1.0)
+        ends = [body.clearance((place + h * way)[None], center, 1.0)[0][0] for h in (1e-6, -1e-6)]
+        rise, fall = (ends[0] - here[0]) / 1e-6, (here[0] - ends[1]) / 1e-6
+        # But for edges, where the nearest place jumps.
+        if abs(rise - fall) < 1e-4:
+            assert slope[0] @ way == pytest.approx(rise, abs=1e-3)
+
+
 @pytest.mark.parametrize(
     ("make", "words"),
     [

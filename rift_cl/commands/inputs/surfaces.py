@@ -123,10 +123,22 @@ def sides_of(sampled: ViewSet, distance: float) -> Sides:
 
 def _ways(sampled: ViewSet, count: int) -> Floats:
     """Directions (n, 3) evenly all round, but for those below all cameras."""
+    return sides_above(sampled.up, float((sampled.directions() @ sampled.up).min()), count)
+
+
+def sides_above(up: Floats, lowest: float, count: int) -> Floats:
+    """Directions evenly all round, but for those below the horizon and below all cameras.
+
+    Few targets hang in the air: what nobody looks at from below needs no view.
+
+    Args:
+        up: (3,) unit vector.
+        lowest: sine of the least elevation of a camera.
+        count: of all directions; those that are left out are fewer.
+    """
     half = directions_for(3, count // 2)
     ways = np.concatenate([half, -half])
-    lowest = min(0.0, float((sampled.directions() @ sampled.up).min()))
-    return np.asarray(ways[ways @ sampled.up >= lowest - 1e-9])
+    return np.asarray(ways[ways @ up >= min(0.0, lowest) - 1e-9])
 
 
 def _open_ways(sampled: ViewSet, distance: float, count: int) -> Floats:

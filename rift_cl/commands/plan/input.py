@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from rift_cl.commands.analyze.input import open_sampled
 from rift_cl.commands.analyze.settings import AnalyzeSettings
-from rift_cl.commands.inputs.surfaces import SURFACE, hidden_places, surface_of
+from rift_cl.commands.inputs.surfaces import SURFACE, hidden_places, sides_above, surface_of
 from rift_cl.commands.inputs.view_set import Floats, ViewSet
 from rift_cl.commands.options import absolute_paths
 from rift_cl.commands.plan.scanner import (
@@ -36,7 +36,7 @@ from rift_cl.sampling.planning.paths import Free, Ring, Spline, TiltedRings
 from rift_cl.sampling.planning.paths import Path as Way
 from rift_cl.sampling.targets.directional_prior import Trusted
 from rift_cl.sampling.targets.pilot import Pilot
-from rift_cl.sampling.targets.prior import PowerLaw, Prior, directions_for
+from rift_cl.sampling.targets.prior import PowerLaw, Prior
 from rift_cl.sampling.targets.target import Target
 
 Samples = NDArray[np.float32]
@@ -135,8 +135,6 @@ def _in_sight(
 def _have(settings: PlanSettings, path: Path) -> ViewSet:
     if not holds_capture(path):
         return scanned(settings, path)
-    if settings.geometry is not None:
-        raise InputError(f"--geometry applies to scans, --have {path} is a capture")
     asked = AnalyzeSettings(
         source=path, center=_in_units(settings), diameter=_over(settings.diameter, settings.unit),
         unit=settings.unit, mode="surface" if settings.opaque else "volume", device=settings.device,
@@ -178,13 +176,14 @@ def _target(
     prior = _prior(settings, diameter, volume, notes)
     points, normals = center[None], None
     if settings.opaque:
-        ways = directions_for(3, SURFACE // 2)
-        normals = np.concatenate([ways, -ways])
+        up = np.array([0.0, 0, 1]) if have is None else have.up
+        normals = sides_above(up, math.sin(math.radians(settings.elevation[0])), 2 * SURFACE)
         points = center + diameter / 2 * normals
         if have is None:
             notes.append(
-                "The target is taken to be opaque: a sphere stands for its surface, and nothing "
-                "else occludes it (--mode volume is for X-rays)."
+                "The target is taken to be opaque: a sphere stands for its surface, without the "
+                "sides that face below all cameras, and nothing else occludes it (--mode volume is "
+                "for X-rays)."
             )
         elif have.space is None:
             notes.append(

@@ -8,7 +8,7 @@ gantry) against it.
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import fields, replace
 from pathlib import Path
 
 import numpy as np
@@ -16,6 +16,7 @@ import numpy as np
 from rift_cl.commands.analyze.input import in_millimetres, open_sampled
 from rift_cl.commands.analyze.settings import AnalyzeSettings
 from rift_cl.commands.analyze.suggestions import camera_type_of, usual_distance
+from rift_cl.commands.inputs.scan_input import ScanArrays
 from rift_cl.commands.inputs.view_set import Floats, ViewSet
 from rift_cl.commands.plan.settings import PlanSettings
 from rift_cl.errors import InputError
@@ -48,9 +49,8 @@ def scanned(settings: PlanSettings, path: Path) -> ViewSet:
             f"--cover is {settings.cover:g}, but --have {path} is a scan: wanted {COVER:g} at most"
         )
     diameter = None if settings.diameter is None else settings.diameter / settings.unit
-    asked = AnalyzeSettings(
-        source=path, geometry=settings.geometry, diameter=diameter, device=settings.device
-    )
+    read = {field.name: getattr(settings, field.name) for field in fields(ScanArrays)}
+    asked = AnalyzeSettings(source=path, diameter=diameter, device=settings.device, **read)
     asked.check()
     sampled = open_sampled(asked)
     if sampled.scan is not None:

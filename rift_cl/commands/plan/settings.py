@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import ClassVar, Literal
 
+from rift_cl.commands.inputs.scan_input import ScanArrays
 from rift_cl.commands.options import ResumableRun
 from rift_cl.errors import InputError
 from rift_cl.option_marks import Auto, AutoExpert, Expert, Several
@@ -23,9 +24,6 @@ class PlanTarget:
     have: Auto[Path] = None
     """A capture, or a fan-beam or cone-beam scan, with views that are taken already: plan those
     that add most."""
-    geometry: Auto[Path] = None
-    """With a scan as --have: its geometry, where its file does not hold it (see 'rift
-    reconstruct')."""
     unit: float = 1.0
     """Millimetres per world unit of --have."""
     diameter: Auto[float] = None
@@ -51,6 +49,31 @@ class PlanTarget:
     """Signal-to-noise ratio of one view at one cycle per diameter."""
     band: Auto[float] = None
     """Highest frequency of interest, in cycles per millimetre. Default: 16 per diameter."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class PlanScan(ScanArrays):
+    """How a scan as --have is read, where its file does not say it."""
+
+    group: ClassVar[str] = "scan"
+
+    def check_scan(self, have: Path | None) -> None:
+        """Refuse options of a scan where there is none.
+
+        Raises:
+            InputError: one is given, and ``have`` is not there or is a capture.
+        """
+        given = next((f.name for f in fields(ScanArrays) if getattr(self, f.name) != f.default), "")
+        if not given:
+            return
+        option = given.replace("_", "-")
+        if have is None:
+            raise InputError(f"--{option} applies to --have: name a scan")
+        # Imported when asked, so that a command's help loads no reader.
+        from rift_cl.io.captures.capture import holds_capture
+
+        if have.exists() and holds_capture(have):
+            raise InputError(f"--{option} applies to scans, --have {have} is a capture")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -85,7 +108,7 @@ class PlanCameras:
     keep_out: Several[str] = ()
     """Regions without cameras: sphere:X,Y,Z,RADIUS, box:X,Y,Z,X,Y,Z (inf for unbounded), or
     cone:X,Y,Z,DX,DY,DZ,DEGREES, in millimetres; with the prefix 'body-' they also occlude the
-    target. Default: none."""
+    target, of whose outline cameras see --cover beside them. Default: none."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -119,7 +142,7 @@ class PlanOutput:
 
 
 @dataclass(frozen=True)
-class PlanSettings(ResumableRun, PlanOutput, PlanCameras, PlanTarget, PlanMethod):
+class PlanSettings(ResumableRun, PlanOutput, PlanCameras, PlanScan, PlanTarget, PlanMethod):
     """Plan camera poses that minimize what remains uncertain about a target.
 
     Example: rift plan --views 64 --diameter 60 --elevation 0 70 --out plan
@@ -162,9 +185,9 @@ class PlanSettings(ResumableRun, PlanOutput, PlanCameras, PlanTarget, PlanMethod
             )
         if self.seed < 0:
             raise InputError(f"--seed is {self.seed}, wanted 0 or more")
-        for name, unused in (("unit", 1.0), ("geometry", None)):
-            if getattr(self, name) != unused and self.have is None:
-                raise InputError(f"--{name} applies to --have: name a capture or a scan")
+        if self.unit != 1 and self.have is None:
+            raise InputError("--unit applies to --have: name a capture or a scan")
+        self.check_scan(self.have)
         self._check_pilot()
 
     def _check_pilot(self) -> None:

@@ -112,15 +112,15 @@ def allowed(design: DesignSpace, view_table: ViewTable) -> NDArray[np.bool_]:
     places = view_table.places(design)
     clear = np.ones(len(places), bool)
     for keepout in design.constraints.keepouts:
-        clear &= keepout.clearance(places, design.target.center)[0] >= 0
+        clear &= design.clearance(keepout, places)[0] >= 0
     return clear
 
 
 def _nowhere(design: DesignSpace, view_table: ViewTable) -> str:
-    places, center = view_table.places(design), design.target.center
+    places = view_table.places(design)
     shares = []
     for index, keepout in enumerate(design.constraints.keepouts):
-        lost = float(np.mean(keepout.clearance(places, center)[0] < 0))
+        lost = float(np.mean(design.clearance(keepout, places)[0] < 0))
         shares.append(f"keepouts[{index}] takes {lost:.0%}")
     return (
         f"Constraints: keep-outs leave no place for a camera ({', '.join(shares)} of "

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from rift_cl.errors import InputError
 from rift_cl.geometry.camera_type import CameraType
 from rift_cl.sampling.planning.constraints import Constraints, Ranges
+from rift_cl.sampling.planning.keep_out import KeepOut
 from rift_cl.sampling.targets.target import Target
 
 Floats = NDArray[np.float64]
@@ -102,6 +103,14 @@ class DesignSpace:
         by_focus = (focal / plane) ** 2 * magnified
         by_image = (focal / image) ** 2 * self._half_side(kind) / radius
         return focal, by_focus + by_image * distance / root, by_focus
+
+    def clearance(self, keepout: KeepOut, places: Floats) -> tuple[Floats, Floats]:
+        """How far cameras at places (n, 3) stay clear of a keep-out; see ``KeepOut.clearance``.
+
+        A body is to leave as much of the target's outline in sight as a picture has to hold.
+        """
+        shown = math.sqrt(self.constraints.cover) * self.target.diameter / 2
+        return keepout.clearance(places, self.target.center, shown)
 
     @cached_property
     def _half_sides(self) -> tuple[float, ...]:

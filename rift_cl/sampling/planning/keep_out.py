@@ -136,7 +136,7 @@ class KeepOut:
 
     Args:
         shape: where.
-        hides: whether it is a body: the target's centre is not seen through it either.
+        hides: whether it is a body: the target is not seen through it either.
 
     Raises:
         InputError: the shape is none of these, or hides though it is no body.
@@ -152,12 +152,16 @@ class KeepOut:
         if not isinstance(self.shape, Sphere | Box | Cone | OutOfSight):
             raise InputError(f"KeepOut: shape is {self.shape!r}, wanted a Sphere, a Box or a Cone")
 
-    def clearance(self, places: Floats, center: Floats) -> tuple[Floats, Floats]:
+    def clearance(
+        self, places: Floats, center: Floats, radius: float = 0.0
+    ) -> tuple[Floats, Floats]:
         """How far cameras, or their lines of sight, stay clear.
 
         Args:
             places: (n, 3) where the cameras stand.
             center: (3,) what they look at.
+            radius: of the ball about it that a body is to leave in sight; of a body that reaches
+                into the ball, as much of it as it leaves free.
 
         Returns:
             Distances (n,), negative where a camera may not stand, and their gradient by the
@@ -165,25 +169,31 @@ class KeepOut:
         """
         if not self.hides:
             return self.shape.distance(places)
-        # The shapes are convex, so that along a line of sight the distance has one minimum.
+        # The shapes are convex, so that along a line of sight the distance has one minimum, also
+        # less the radius there of the cone from the camera to the ball.
+        free = float(self.shape.distance(np.asarray(center)[None])[0][0])
+        radius = min(radius, max(free, 0.0))
         step = center - places
         low, high = np.zeros(len(places)), np.ones(len(places))
         share = (math.sqrt(5) - 1) / 2
         for _ in range(_SECTIONS):
             first, second = high - share * (high - low), low + share * (high - low)
-            falls = self._along(places, step, first) > self._along(places, step, second)
+            falls = self._along(places, step, first, radius) > self._along(
+                places, step, second, radius
+            )
             low, high = np.where(falls, first, low), np.where(falls, high, second)
         at = (low + high) / 2
         # The ends are no stationary points: there the section only comes near.
         ends = np.stack([at, np.zeros_like(at), np.ones_like(at)])
         at = ends[
-            np.argmin([self._along(places, step, end) for end in ends], axis=0), np.arange(len(at))
+            np.argmin([self._along(places, step, end, radius) for end in ends], axis=0),
+            np.arange(len(at)),
         ]
         distance, slope = self.shape.distance(places + at[:, None] * step)
-        return distance, slope * (1 - at)[:, None]
+        return distance - radius * at, slope * (1 - at)[:, None]
 
-    def _along(self, places: Floats, step: Floats, share: Floats) -> Floats:
-        return self.shape.distance(places + share[:, None] * step)[0]
+    def _along(self, places: Floats, step: Floats, share: Floats, radius: float) -> Floats:
+        return self.shape.distance(places + share[:, None] * step)[0] - radius * share
 
 
 def _point(name: str, value: ArrayLike, endless: bool = False) -> tuple[float, float, float]:

@@ -108,9 +108,9 @@ def _no_path(design: DesignSpace, curves: list[Curve], views: int) -> str:
             layout = PathLayout(design, curve, 0, views, np.concatenate([start, shared]))
             view_table = layout.view_table(layout.start)
             tried += 1
-            places, center = view_table.places(design), design.target.center
+            places = view_table.places(design)
             for index, keepout in enumerate(design.constraints.keepouts):
-                lost[index] += (keepout.clearance(places, center)[0] < 0).any()
+                lost[index] += (design.clearance(keepout, places)[0] < 0).any()
     shares = ", ".join(f"keepouts[{i}] cuts {n}" for i, n in enumerate(lost.tolist()))
     return (
         f"Constraints: no path {name} with {views} views keeps clear of the keep-outs (of {tried} "

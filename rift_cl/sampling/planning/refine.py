@@ -149,7 +149,7 @@ def _constrain(optimiser: Any, design: DesignSpace, layout: Layout) -> None:
     begin, budget = layout.view_table(layout.start), design.constraints.budget
     places = begin.places(design)
     for keepout in design.constraints.keepouts:
-        clear, _ = keepout.clearance(places, design.target.center)
+        clear, _ = design.clearance(keepout, places)
         near = np.flatnonzero(clear <= layout.reach)
         if len(near):
             tolerance = np.full(len(near), _TOLERANCE)
@@ -168,7 +168,7 @@ def _entering(
 
     def entered(result: Floats, numbers: Floats, slope: Floats) -> None:
         views = layout.view_table(numbers)
-        clear, by_place = keepout.clearance(views.take(near).places(design), design.target.center)
+        clear, by_place = design.clearance(keepout, views.take(near).places(design))
         result[:] = -clear / unit
         if slope.size:
             by_table = np.zeros((len(near), len(views), COLUMNS))
