@@ -8,6 +8,7 @@ which its wheels lack, goes through pi-heif.
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
@@ -17,7 +18,7 @@ import numpy as np
 import OpenImageIO
 from numpy.typing import NDArray
 
-from rift_cl.errors import FileFormatError, ResourceLimitError
+from rift_cl.errors import FileFormatError, InputError, ResourceLimitError
 from rift_cl.io.boundary import check_claim, reading
 from rift_cl.io.images.heic import BRANDS, heic_codes, opened_heic
 
@@ -65,7 +66,7 @@ def write_pixels(
     output = OpenImageIO.ImageOutput.create(format)
     if output is None:
         raise OSError(f"OpenImageIO cannot write {format}")
-    done = output.open(str(path), spec)
+    done = output.open(_name(path), spec)
     if done:
         done = output.write_image(np.ascontiguousarray(pixels))
         done = output.close() and done
@@ -131,7 +132,7 @@ def opened_image(path: Path, format: str) -> Iterator[Any]:
     every = OpenImageIO.get_int_attribute("try_all_readers", 1)
     OpenImageIO.attribute("try_all_readers", 0)
     try:
-        source = OpenImageIO.ImageInput.open(str(path), config)
+        source = OpenImageIO.ImageInput.open(_name(path), config)
     finally:
         OpenImageIO.attribute("try_all_readers", every)
     if source is None:
@@ -144,6 +145,20 @@ def opened_image(path: Path, format: str) -> Iterator[Any]:
         yield source
     finally:
         source.close()
+
+
+def _name(path: Path) -> str:
+    """A file's name as OpenImageIO wants it, UTF-8, whatever Python takes names for.
+
+    Raises:
+        InputError: the name is not UTF-8.
+    """
+    try:
+        return os.fsencode(path).decode("utf-8")
+    except UnicodeDecodeError as error:
+        raise InputError(
+            f"{path}: the name of an image has to be UTF-8, which this is not: rename it"
+        ) from error
 
 
 def image_format(path: Path) -> str:
