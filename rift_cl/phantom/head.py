@@ -55,7 +55,11 @@ def shepp_logan(grid: Grid, *, oversampling: int = 4) -> NDArray[np.float32]:
 
 
 def shepp_logan_sinogram(grid: Grid, scan: Scan) -> NDArray[np.float32]:
-    """The exact line integrals of the head that ``shepp_logan(grid)`` shows; see ``project``."""
+    """The exact line integrals of the head that ``shepp_logan(grid)`` shows; see ``project``.
+
+    Along lines through the bins' centres: a detector averages over its bins, which several bins in
+    place of each, averaged, come near to.
+    """
     return project(head(grid), grid, scan)
 
 
