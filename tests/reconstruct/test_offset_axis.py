@@ -133,6 +133,22 @@ def test_only_full_turns_with_an_axis_off_the_middle_are_offset():
     assert not is_full_turn(half)
 
 
+@pytest.mark.parametrize("views", [16, 40, 41, 60])
+@pytest.mark.parametrize("every", [3, 8, 20])
+def test_a_full_turn_stays_one_where_every_so_many_views_are_left_out(views, every):
+    turn = np.arange(views) * 2 * np.pi / views + 0.3
+    assert is_full_turn(np.delete(turn, np.arange(0, views, every)))
+
+
+@pytest.mark.parametrize("views", [7, 8, 12, 40])
+@pytest.mark.parametrize("degrees", [180, 200, 230])
+def test_short_scans_are_no_full_turns_with_holes(views, degrees):
+    span = np.linspace(0, np.deg2rad(degrees), views)
+    assert not is_full_turn(span)
+    assert not is_full_turn(np.delete(span, np.arange(1, views, 8)))
+    assert not is_full_turn(np.concatenate([span / 3, np.pi + span / 3]))
+
+
 @pytest.mark.parametrize("center", [6.0, CENTER, 30.25, BINS - 8.4])
 @pytest.mark.parametrize("noise", [0, 0.02])
 def test_the_axis_is_found_near_an_end(center, noise):
