@@ -66,6 +66,15 @@ def sees_further(center: float, bins: int) -> bool:
     return 0 < short < _OFFSET * long
 
 
+def seen_bins(scan: Parallel | Fan) -> int:
+    """Bins of a detector that shows what a scan does on both sides of its axis.
+
+    Of a full turn with an offset axis that is one to the farther end on either side, otherwise the
+    scan's own.
+    """
+    return scan.bins + (_missing(scan) if is_offset(scan) else 0)
+
+
 def is_uneven(center: float, bins: int) -> bool:
     """Whether lines next to the ends of a detector are seen on one side of the axis alone."""
     short, long = sorted((center, bins - 1 - center))
@@ -155,13 +164,17 @@ def widened(projections: Stack, scan: Parallel) -> tuple[Stack, Parallel]:
 
 def widened_scan(scan: Parallel) -> tuple[Parallel, int]:
     """The scan of a detector as wide as twice the longer side, and how many bins come before."""
-    longer = _right_over_left(scan)
-    missing = int(np.ceil(abs(longer)))
-    before = missing if longer > 0 else 0
+    missing = _missing(scan)
+    before = missing if _right_over_left(scan) > 0 else 0
     bins = scan.bins + missing
     return Parallel(scan.angles, bins, scan.pitch, scan.center + before), before
 
 
-def _right_over_left(scan: Parallel) -> float:
+def _missing(scan: Parallel | Fan) -> int:
+    """Bins that the shorter side of a detector lacks of the longer one."""
+    return int(np.ceil(abs(_right_over_left(scan))))
+
+
+def _right_over_left(scan: Parallel | Fan) -> float:
     """Bins that a detector has after the axis beyond those before it."""
     return scan.bins - 1 - scan.center - scan.center
