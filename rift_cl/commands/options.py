@@ -145,6 +145,19 @@ S = TypeVar("S")
 MAY_BE_FILES = "theta", "flats", "darks"
 
 
+def check_tilt(tilt: float | None) -> None:
+    """Refuse a tilt of the rotation axis that is no misalignment.
+
+    Args:
+        tilt: in degrees; None where it is not said.
+
+    Raises:
+        InputError: it is too large, or no number.
+    """
+    if tilt is not None and not abs(tilt) <= MOST_TILT:
+        raise InputError(f"--tilt is {tilt:g} degrees, wanted {MOST_TILT:g} at most")
+
+
 def absolute_paths(settings: S) -> S:
     """The same settings with every path from the root, for a file that is read elsewhere."""
     changed: dict[str, Any] = {}

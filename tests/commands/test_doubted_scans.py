@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import rift_cl as rift
-from rift_cl.commands.reconstruct.slice_input import tilt_worth_turning, unsure_tilt
+from rift_cl.commands.inputs.scan_axis import tilt_worth_turning, unsure_tilt
 from rift_cl.phantom import Ellipsoid
 from rift_cl.reconstruct import AxisEstimate
 

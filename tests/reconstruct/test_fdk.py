@@ -175,6 +175,12 @@ def test_a_detector_to_one_side_of_the_axis_sees_all_in_a_full_turn(device, cent
     assert rift.dot_test(F) < 1e-8
 
 
+def test_a_full_turn_of_a_displaced_detector_may_lack_every_eighth_view(device):
+    whole = replace(circle(FULL[::2]), bins=N - 7, center=(15.5, 8.5))
+    left = whole.subset([view for view in range(whole.views) if view % 8])
+    assert quality(device, left) > quality(device, whole) - 1.5
+
+
 def rim(device, scan, parts):
     """Error in the outer fifth of a disc, root mean square, short of its edge."""
     grid = Grid((2, 2 * N, 2 * N), spacing=0.5)

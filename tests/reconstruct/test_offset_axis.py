@@ -69,6 +69,17 @@ def test_weighing_is_part_of_the_operator(device):
     np.testing.assert_array_equal(again(*given)(y), whole)
 
 
+def test_a_view_stands_for_its_own_side_where_its_opposite_is_missing():
+    angles = np.delete(ANGLES[::8], np.arange(0, 60, 8))
+    best, errors = half_sinogram(CENTER, angles=ANGLES[::8]), []
+    for sinogram, scan in (best, half_sinogram(CENTER, angles=angles)):
+        image = rift.fbp(rift.Projector(GRID, scan), sinogram)
+        whole, every = best
+        again = rift.Projector(GRID, every)(image)
+        errors.append(np.linalg.norm(again - whole) / np.linalg.norm(whole))
+    assert errors[1] < 1.5 * errors[0]
+
+
 @pytest.mark.parametrize("center", [11.3, 44.6, 45.2])
 def test_rays_are_weighed_once(center):
     """Whether the sides of what ``widened`` gives are of one length or not."""
@@ -131,6 +142,22 @@ def test_only_full_turns_with_an_axis_off_the_middle_are_offset():
     two_holes = [*range(100, 120), *range(200, 220)]
     assert not is_full_turn(np.delete(np.deg2rad(np.arange(360)), two_holes))
     assert not is_full_turn(half)
+
+
+@pytest.mark.parametrize("views", [16, 40, 41, 60])
+@pytest.mark.parametrize("every", [3, 8, 20])
+def test_a_full_turn_stays_one_where_every_so_many_views_are_left_out(views, every):
+    turn = np.arange(views) * 2 * np.pi / views + 0.3
+    assert is_full_turn(np.delete(turn, np.arange(0, views, every)))
+
+
+@pytest.mark.parametrize("views", [7, 8, 12, 40])
+@pytest.mark.parametrize("degrees", [180, 200, 230])
+def test_short_scans_are_no_full_turns_with_holes(views, degrees):
+    span = np.linspace(0, np.deg2rad(degrees), views)
+    assert not is_full_turn(span)
+    assert not is_full_turn(np.delete(span, np.arange(1, views, 8)))
+    assert not is_full_turn(np.concatenate([span / 3, np.pi + span / 3]))
 
 
 @pytest.mark.parametrize("center", [6.0, CENTER, 30.25, BINS - 8.4])

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from rift_cl.commands.fit_xray.input import Projections, XrayPictures
-from rift_cl.geometry import Parallel
+from rift_cl.geometry import Grid, Parallel
 from rift_cl.splat.orders import count_of
 from rift_cl.splat.renderer import Renderer
 from rift_cl.splat.settings import SplatSettings
@@ -20,7 +20,7 @@ def projections(views, rows, values=None):
     angles = np.arange(views) * np.pi / views
     if values is None:
         values = np.zeros((views, rows, SIZE), np.float32)
-    return Projections(Parallel(angles, SIZE), values, 1.0)
+    return Projections(Parallel(angles, SIZE), values, 1.0, Grid((rows, SIZE, SIZE)))
 
 
 def cameras_of(views, rows):

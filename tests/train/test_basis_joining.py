@@ -9,7 +9,7 @@ import pytest
 from test_trainer import SETTINGS, Ball
 
 from rift_cl.errors import CheckpointError
-from rift_cl.geometry import Parallel
+from rift_cl.geometry import Grid, Parallel
 from rift_cl.splat.orders import count_of
 from rift_cl.splat.settings import SplatSettings
 from rift_cl.train.basis_settings import AngularSettings, BasisSettings
@@ -160,7 +160,7 @@ class Row:
         angles = np.arange(8) * np.pi / 8
         values = np.random.default_rng(1).random((8, 1, 12)).astype(np.float32)
         self.device = device
-        self.projections = Projections(Parallel(angles, 12), values, 1.0)
+        self.projections = Projections(Parallel(angles, 12), values, 1.0, Grid((1, 12, 12)))
         self.cameras = self.projections.views.cameras
 
     def begin(self, step):

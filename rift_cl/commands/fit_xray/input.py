@@ -21,8 +21,9 @@ from numpy.typing import NDArray
 from rift_cl.cl.device import Device
 from rift_cl.commands.fit_photos.pictures import Light
 from rift_cl.commands.fit_xray.settings import FitXraySettings
+from rift_cl.commands.inputs.axis_alignment import Alignment
 from rift_cl.commands.inputs.row_doubts import row_doubts
-from rift_cl.commands.inputs.scan_axis import find_axis
+from rift_cl.commands.inputs.scan_axis import find_axis, tilt_worth_turning
 from rift_cl.commands.inputs.scan_input import ScanInput
 from rift_cl.commands.inputs.scan_lengths import BIN, with_lengths
 from rift_cl.commands.inputs.scan_rows import (
@@ -30,12 +31,19 @@ from rift_cl.commands.inputs.scan_rows import (
     chosen_rows,
     read_attenuation,
 )
+from rift_cl.commands.inputs.told_axis import (
+    axis_of_cone,
+    doubted_parallel,
+    found_in_words,
+    offset_in_words,
+)
 from rift_cl.errors import InputError
 from rift_cl.geometry import Camera, Cone, Grid, Parallel, Vectors
 from rift_cl.geometry.scan_cameras import ScanCameras, scan_cameras
 from rift_cl.geometry.seen_grid import scan_lengths, seen_grid
 from rift_cl.io.boundary import check_claim
 from rift_cl.io.scans.scan_file import ScanFile
+from rift_cl.reconstruct.direct.offset_axis import is_offset, seen_bins
 
 # Line integrals are measured by the value that this share of them stays below.
 _STRONG = 0.999
@@ -83,20 +91,22 @@ class XrayInput:
                 f"{self.scan.path}: is a fan-beam scan, a fit takes parallel and cone beams; "
                 "'rift reconstruct' takes fans as well"
             )
-        self.device = device
+        self.settings, self.device = settings, device
         self._refuse_for_cones(settings)
         # What was found of the axis and has to be said of the rows, once they were read.
         self.notes: list[str] = []
         self.rows = chosen_rows(settings.rows, self.scan)
         check_center(settings.center, self.scan)
-        self.center = settings.center
+        # Bin of the rotation axis, degrees by which it leans, and whether the angles run the other
+        # way than the file's: as they are said, and after ``read`` as they were found.
+        self.center, self.tilt, self.turned = settings.center, settings.tilt or 0.0, False
         solve = settings.training.solve
         self._solved = solve.views if solve.every else 0
         self.pitch = self._length(settings)
         self.unit = self.scan.unit or (BIN if self.pitch == 1.0 else "")
         # Made now, so that a bad pitch is told before any work.
         Parallel(self.scan.angles, self.scan.shape[2], self.pitch, self.center)
-        check_claim(self.scan.path, "a fit of these rows", self.need, settings.budget())
+        self._check_memory()
 
     def _refuse_for_cones(self, settings: FitXraySettings) -> None:
         """Refuse options whose meaning a cone beam's geometry has settled.
@@ -106,7 +116,7 @@ class XrayInput:
         """
         given = {"rows": settings.rows, "pitch": settings.pitch}
         if isinstance(self.scan.cone, Vectors):
-            given["center"] = settings.center
+            given |= {"center": settings.center, "tilt": settings.tilt}
         for name, value in given.items():
             if self.scan.cone is not None and value is not None:
                 raise InputError(
@@ -123,11 +133,30 @@ class XrayInput:
 
     @property
     def grid(self) -> Grid:
-        """The voxels of the slices that are written, in lengths of bins."""
-        rows = self.rows[1] - self.rows[0]
-        if self.scan.cone is None:
-            return Grid((rows, self.scan.shape[2], self.scan.shape[2]))
-        return seen_grid(self.scan.cone.scaled(1 / self.pitch), 1.0)
+        """The voxels of the slices that are written, in lengths of bins; final once it was read."""
+        scan = self._geometry()
+        if not isinstance(scan, Parallel):
+            return seen_grid(scan, 1.0)
+        across = seen_bins(scan)
+        return Grid((self.rows[1] - self.rows[0], across, across))
+
+    @property
+    def raised(self) -> float:
+        """Height of the slices' middle in the scan's unit; a fit has it at 0.
+
+        That of a cone is the height above the source's orbit there as here.
+        """
+        if self.scan.cone is not None:
+            return 0.0
+        return (self.rows[0] + (self.rows[1] - self.rows[0] - 1) / 2) * self.pitch
+
+    def _check_memory(self) -> None:
+        """Refuse rows of which a fit takes more memory than there is.
+
+        Raises:
+            InputError: they do.
+        """
+        check_claim(self.scan.path, "a fit of these rows", self.need, self.settings.budget())
 
     def first_sample(self, grid: Grid) -> tuple[float, float, float]:
         """Where the first voxel stands, in the scan's unit, as ``rift reconstruct`` has it.
@@ -152,32 +181,97 @@ class XrayInput:
         """All line integrals, and the rotation axis.
 
         Raises:
+            InputError: nothing is attenuated, or the axis cannot be found.
+        """
+        found, middle = read_attenuation(self.scan, *self.rows), sum(self.rows) // 2
+        integrals, scale = found.projections, self._strongest(found.projections)
+        row = found.of_row(middle - self.rows[0])
+        self.notes = self._find_axis(row.projections[:, 0])
+        self._check_memory()
+        alignment = self._alignment()
+        if alignment is not None:
+            self.notes.append(alignment.words)
+            integrals = self._aligned(alignment)
+            scale = self._strongest(integrals)
+        self.notes += self._offset_note() + row_doubts(self.scan, middle, row)
+        return Projections(self._geometry(), integrals / np.float32(scale), scale, self.grid)
+
+    def _strongest(self, integrals: Floats) -> float:
+        """What line integrals are measured by.
+
+        Raises:
             InputError: nothing is attenuated.
         """
-        found = read_attenuation(self.scan, *self.rows)
-        integrals = found.projections
         scale = float(np.quantile(integrals, _STRONG))
         if scale <= 0:
             raise InputError(
                 f"{self.scan.path}: the line integrals are {scale:g} at most, wanted some above 0: "
                 "there is nothing to fit"
             )
-        values, geometry = integrals / np.float32(scale), self._geometry()
-        middle = sum(self.rows) // 2
-        self.notes += row_doubts(self.scan, middle, found.of_row(middle - self.rows[0]))
-        return Projections(geometry, values, scale)
+        return scale
+
+    def _find_axis(self, line: Floats) -> list[str]:
+        """Find the axis, its tilt and a cone's sense of rotation, unless they are said.
+
+        Args:
+            line: line integrals of the middle one of the rows, (angle, bin).
+
+        Returns:
+            What is to be said of them, a sentence each.
+        """
+        scan, center, tilt = self.scan, self.settings.center, self.settings.tilt
+        if scan.cone is not None:
+            axis = axis_of_cone(scan, center, tilt, self.device)
+            self.center, self.tilt, self.turned = axis.center, axis.tilt, axis.turned
+            return list(axis.notes)
+        spanned, detector_rows = self.rows[1] - self.rows[0], scan.shape[1]
+        if center is not None:
+            away = sum(self.rows) // 2 - (detector_rows - 1) / 2
+            return doubted_parallel(
+                scan, line, center, self.tilt, away=away, spanned=spanned, device=self.device
+            )
+        found = find_axis(scan, self.device)
+        self.center = found.center
+        if tilt is None:
+            self.tilt = tilt_worth_turning(found, detector_rows)
+        return found_in_words(found, detector_rows, spanned, tilt)
+
+    def _alignment(self) -> Alignment | None:
+        """How projections are turned, where the axis leans."""
+        scan = self._geometry()
+        if not self.tilt or isinstance(scan, Vectors):
+            return None
+        if isinstance(scan, Cone):
+            row, bin = scan.center
+        else:
+            row, bin = (self.scan.shape[1] - 1) / 2, scan.center
+        return Alignment(bin, row, math.radians(self.tilt))
+
+    def _aligned(self, alignment: Alignment) -> Floats:
+        """Line integrals of the rows, turned so that the axis is at one bin of all of them."""
+        _, detector_rows, bins = self.scan.shape
+        halo = alignment.halo(bins)
+        first, stop = max(0, self.rows[0] - halo), min(detector_rows, self.rows[1] + halo)
+        around = read_attenuation(self.scan, first, stop).projections
+        wanted = slice(self.rows[0] - first, self.rows[1] - first)
+        return alignment.aligned(around, first, wanted, self.device)
+
+    def _offset_note(self) -> list[str]:
+        """What becomes of parallel rays of a full turn whose axis is near the detector's end."""
+        scan = self._geometry()
+        if not isinstance(scan, Parallel) or not is_offset(scan):
+            return []
+        return [offset_in_words(scan.center, combined=False)]
 
     def _geometry(self) -> Parallel | Cone | Vectors:
-        """The rays, in lengths of bins as they are seen at the axis."""
-        cone, center = self.scan.cone, self.center
+        """The rays by what is known of the axis, in lengths of bins as they are seen at it."""
+        cone = self.scan.cone
         if cone is None:
-            if center is None:
-                estimate = find_axis(self.scan, self.device)
-                center = estimate.center
-                self.notes.append(f"The rotation axis was found {estimate.in_words()}.")
-            return Parallel(self.scan.angles, self.scan.shape[2], 1.0, float(center))
-        if isinstance(cone, Cone) and center is not None:
-            cone = dataclasses.replace(cone, center=(cone.center[0], center))
+            return Parallel(self.scan.angles, self.scan.shape[2], 1.0, self.center)
+        if isinstance(cone, Cone):
+            center = cone.center if self.center is None else (cone.center[0], self.center)
+            angles = -cone.angles if self.turned else cone.angles
+            cone = dataclasses.replace(cone, angles=angles, center=center)
         return cone.scaled(1 / self.pitch)
 
 
@@ -189,16 +283,19 @@ class Projections:
         scan: the rays, in lengths of bins as they are seen at the axis.
         values: (V, rows, bins), times ``scale`` the line integrals.
         scale: what a value of one stands for.
+        grid: the voxels of a reconstruction, as large as bins at the axis; those of some of the
+            views are those of all.
     """
 
     scan: Parallel | Cone | Vectors
     values: Floats
     scale: float
+    grid: Grid
 
     def of(self, numbers: Sequence[int]) -> Projections:
         """Some of the views."""
         chosen = list(numbers)
-        return Projections(self.scan.subset(chosen), self.values[chosen], self.scale)
+        return dataclasses.replace(self, scan=self.scan.subset(chosen), values=self.values[chosen])
 
     @property
     def angles(self) -> NDArray[np.float64]:
@@ -214,14 +311,6 @@ class Projections:
         if isinstance(self.scan, Vectors):
             return None
         return self.scan.center if isinstance(self.scan, Parallel) else self.scan.center[1]
-
-    @property
-    def grid(self) -> Grid:
-        """The voxels of a reconstruction, as large as bins at the axis."""
-        if isinstance(self.scan, Parallel):
-            _, rows, bins = self.values.shape
-            return Grid((rows, bins, bins))
-        return seen_grid(self.scan, 1.0)
 
     @property
     def reach(self) -> float:

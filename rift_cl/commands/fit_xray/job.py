@@ -114,7 +114,7 @@ class XrayFit(FitRun[FitXraySettings]):
             rendering=dataclasses.replace(
                 self.settings.rendering, near=trainer.renderer.settings.near
             ),
-            center=whole.center,
+            **self._axis_facts(whole),
             **self._parallel_facts(),
             unit=self.input.unit,
             kind=self.input.scan.kind,
@@ -141,6 +141,17 @@ class XrayFit(FitRun[FitXraySettings]):
             **score_record(self.scores),
         }
         self._leave(splats, volume, whole)
+
+    def _axis_facts(self, whole: Projections) -> dict[str, Any]:
+        """The axis and the sense of rotation, as the options that say them to another fit."""
+        if whole.center is None:
+            return {}
+        source, reversed = self.input, self.settings.reversed
+        return {
+            "center": whole.center,
+            "tilt": source.tilt,
+            "reversed": reversed != source.turned,
+        }
 
     def _parallel_facts(self) -> dict[str, Any]:
         """Settings that were decided and apply to parallel beams alone."""
@@ -182,10 +193,11 @@ class XrayFit(FitRun[FitXraySettings]):
         settings, source, pitch = self.settings, self.input, self.input.pitch
         density = whole.scale / pitch
         scene = XrayScene.of(splats, self.device)
+        raised = np.array([0, 0, source.raised], np.float32)
         # Modes are shares of the peak, in units of the splats' axes: no unit changes them.
         dataclasses.replace(
             scene,
-            means=scene.means * np.float32(pitch),
+            means=scene.means * np.float32(pitch) + raised,
             log_scales=scene.log_scales + np.float32(log(pitch)),
             logit_opacities=scene.logit_opacities + np.float32(log(density)),
         ).save(settings.out / "scene.ply")

@@ -9,7 +9,7 @@ from typing import Annotated, ClassVar, Literal
 from tyro.conf import Positional
 
 from rift_cl.commands.fit.settings import FitOutput, FitSettings
-from rift_cl.commands.options import RepeatableRun
+from rift_cl.commands.options import RepeatableRun, check_tilt
 from rift_cl.io.scans.literals import AngleUnit, Kind
 from rift_cl.option_marks import Auto, AutoExpert, Expert, Short, ShortSplats
 from rift_cl.splat.settings import SplatSettings
@@ -54,8 +54,12 @@ class XrayInput:
     reversed: Expert[bool] = False
     """Negate the angles, for an object that turned in the other sense than assumed."""
     center: Auto[float] = None
-    """Detector bin of the rotation axis. Default: found automatically; of cone beams that of their
-    geometry."""
+    """Detector bin of the rotation axis. Default: found automatically; if the data of a cone do not
+    tell it, that of the file, or the middle of the detector."""
+    tilt: Auto[float] = None
+    """Tilt of the rotation axis in the detector plane in degrees, positive where its bin grows with
+    the row. Default: the tilt found with the axis if it moves the axis by a quarter of a bin or
+    more and the rows agree on it, otherwise 0."""
     rows: Auto[tuple[int, int]] = None
     """First detector row, and the one after the last, of parallel beams. Default: all rows."""
     pitch: Auto[float] = None
@@ -108,6 +112,15 @@ class FitXraySettings(RepeatableRun, XrayOutput, XrayTraining, XrayInput, FitSet
     """
 
     job: ClassVar[str] = "fit xray"
+
+    def check(self) -> None:
+        """Check what neither the trainer nor the rasterizer does.
+
+        Raises:
+            InputError: a setting is out of its range, or has no meaning beside the others.
+        """
+        super().check()
+        check_tilt(self.tilt)
 
     def budget(self) -> int | None:
         """Bytes that --memory allows; None where it was not given."""

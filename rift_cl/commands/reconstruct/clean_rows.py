@@ -9,14 +9,13 @@ how the rows were cut into slabs.
 from __future__ import annotations
 
 import dataclasses
-import math
-from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rift_cl.cl.device import Device
+from rift_cl.commands.inputs.axis_alignment import Alignment
 from rift_cl.commands.inputs.scan_rows import read_attenuation
 from rift_cl.commands.reconstruct.settings import ReconstructSettings
 from rift_cl.errors import InputError
@@ -28,9 +27,6 @@ from rift_cl.reconstruct.preprocess import (
     paganin,
     remove_rings,
     remove_zingers,
-    straightened,
-    tilt_halo,
-    upright,
 )
 
 Floats = NDArray[np.float32]
@@ -41,45 +37,6 @@ _RINGS_FROM = np.deg2rad(150)
 _ZINGER_HALO = 1
 # Options of phase retrieval, all of which it needs.
 _PHASE = ("delta_beta", "energy", "propagation")
-
-
-@dataclass(frozen=True, eq=False)
-class Alignment:
-    """Where the rotation axis is seen, if not at one bin of all rows.
-
-    Args:
-        center: bin at which it is to be in all rows; of a tilted axis, where it is seen at
-            ``pivot``.
-        pivot: the row about which projections are turned.
-        tilt: of the axis in the detector's plane, in radians, positive where its bin grows with
-            the row.
-        centers: bin of each row of the scan, in place of a tilt.
-    """
-
-    center: float
-    pivot: float
-    tilt: float = 0.0
-    centers: NDArray[np.float64] | None = None
-
-    def halo(self, bins: int) -> int:
-        """Rows that are needed on either side of those that are aligned."""
-        return tilt_halo(self.tilt, bins, self.center) if self.tilt else 0
-
-    def aligned(self, rows: Floats, first: int, wanted: slice, device: Device) -> Floats:
-        """Rows of which the axis is at one bin.
-
-        Args:
-            rows: (angle, row, bin), the first of which is row ``first`` of the scan.
-            first: see there.
-            wanted: which of them to return.
-            device: where to compute.
-        """
-        if self.centers is not None:
-            centers = self.centers[first + wanted.start : first + wanted.stop]
-            return straightened(rows[:, wanted], centers, self.center, device=device)
-        part = (wanted.start, wanted.stop)
-        pivot = self.pivot - first
-        return upright(rows, self.tilt, self.center, pivot=pivot, rows=part, device=device)
 
 
 class LoadedRows(NamedTuple):
@@ -207,13 +164,8 @@ class CleanRows:
             notes.append(f"Beam hardening: line integrals y were replaced by {terms}.")
         if self.rings is not None:
             notes.append(f"Stripes were removed from the projections, method {self.rings} (rings).")
-        if self.alignment is not None and self.alignment.centers is not None:
-            notes.append("Each row was moved to the axis that was given for it.")
-        elif self.alignment is not None:
-            notes.append(
-                f"Projections were turned by {math.degrees(self.alignment.tilt):.3f} degrees, the "
-                "tilt of the axis."
-            )
+        if self.alignment is not None:
+            notes.append(self.alignment.words)
         return notes
 
     def _ring_method(self) -> str | None:

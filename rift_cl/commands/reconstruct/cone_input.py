@@ -11,17 +11,12 @@ import numpy as np
 
 from rift_cl.cl.budget import format_bytes
 from rift_cl.cl.device import Device
+from rift_cl.commands.inputs.axis_alignment import Alignment
 from rift_cl.commands.inputs.row_doubts import row_doubts
-from rift_cl.commands.inputs.scan_axis import (
-    doubted_circle,
-    doubted_vectors,
-    settled_axis,
-    tilt_worth_turning,
-    unsure_tilt,
-)
 from rift_cl.commands.inputs.scan_rows import check_center, scan_identity
+from rift_cl.commands.inputs.told_axis import axis_of_cone
 from rift_cl.commands.reconstruct.binned_file import binned_file, row_binning
-from rift_cl.commands.reconstruct.clean_rows import Alignment, CleanRows
+from rift_cl.commands.reconstruct.clean_rows import CleanRows
 from rift_cl.commands.reconstruct.settings import ReconstructSettings
 from rift_cl.commands.reconstruct.slice_window import check_window
 from rift_cl.errors import InputError, ResourceLimitError
@@ -275,21 +270,10 @@ class ConeInput:
 
     def _found_axis(self) -> dict[str, Any]:
         """Bin of the axis on the detector as the file has it, and how it is known."""
-        if self.settings.center is not None:
-            self.notes += doubted_circle(self.file, self.settings.center, self.device)
-            return {"center": self.settings.center, "by": "--center"}
         if self._axis_taken:
             return {"center": self.center, "by": "search"}
-        cone = self.file.cone
-        if isinstance(cone, Vectors):
-            self.notes += doubted_vectors(self.file, cone)
-        if not isinstance(cone, Cone):
-            return {"center": (self.file.shape[2] - 1) / 2, "by": "the vectors"}
-        axis = settled_axis(self.file, cone.center[1], self.device)
-        self.center, self.turned = axis.center, axis.turned
-        if self.settings.tilt is None and axis.found is not None:
-            self.tilt = tilt_worth_turning(axis.found, self.file.shape[1]) or self.tilt
-            self.notes += unsure_tilt(axis.found, self.file.shape[1])
+        axis = axis_of_cone(self.file, self.settings.center, self.settings.tilt, self.device)
+        self.center, self.tilt, self.turned = axis.center, axis.tilt, axis.turned
         self.notes += axis.notes
         return axis.record
 

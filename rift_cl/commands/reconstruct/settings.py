@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
 from rift_cl.commands.inputs.scan_input import ScanInput
-from rift_cl.commands.options import MOST_TILT, SpreadRun
+from rift_cl.commands.options import SpreadRun, check_tilt
 from rift_cl.errors import InputError
 from rift_cl.option_marks import Auto, AutoExpert, Expert
 from rift_cl.own_parts import decisive_parts
@@ -246,8 +246,7 @@ class ReconstructSettings(
 
             checked_coefficients(self.hardening)
         self._check_samples()
-        if self.tilt is not None and not abs(self.tilt) <= MOST_TILT:
-            raise InputError(f"--tilt is {self.tilt:g} degrees, wanted {MOST_TILT:g} at most")
+        check_tilt(self.tilt)
         if self.centers is not None and (self.center is not None or self.tilt is not None):
             raise InputError("--centers replaces --center and --tilt: leave those out")
         if self.subsets not in (None, 1) and self.precondition is not None:

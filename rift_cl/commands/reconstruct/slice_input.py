@@ -9,23 +9,20 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from contextlib import suppress
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rift_cl.cl.device import Device
+from rift_cl.commands.inputs.axis_alignment import Alignment
 from rift_cl.commands.inputs.row_doubts import row_doubts
 from rift_cl.commands.inputs.scan_axis import (
     SettledAxis,
-    doubted_center,
     doubted_circle,
-    doubted_tilt,
     find_axis,
     settled_axis,
     tilt_worth_turning,
-    unsure_tilt,
 )
 from rift_cl.commands.inputs.scan_lengths import BIN
 from rift_cl.commands.inputs.scan_rows import (
@@ -33,22 +30,23 @@ from rift_cl.commands.inputs.scan_rows import (
     chosen_rows,
     scan_identity,
 )
+from rift_cl.commands.inputs.told_axis import doubted_parallel, found_in_words, offset_in_words
 from rift_cl.commands.reconstruct.binned_file import binned_file, row_binning
-from rift_cl.commands.reconstruct.clean_rows import Alignment, CleanRows, LoadedRows
+from rift_cl.commands.reconstruct.clean_rows import CleanRows, LoadedRows
 from rift_cl.commands.reconstruct.settings import ReconstructSettings
-from rift_cl.errors import InputError, RiftError
+from rift_cl.errors import InputError
 from rift_cl.geometry import Fan, Parallel, at_axis
 from rift_cl.geometry.length_units import length_unit
 from rift_cl.io.number_list import read_numbers
 from rift_cl.io.scans.scan_file import ScanFile
 from rift_cl.reconstruct import Attenuation
 from rift_cl.reconstruct.axis import AxisEstimate
-from rift_cl.reconstruct.axis.search import angle_doubt
 from rift_cl.reconstruct.direct.fan_rebin import covered_rays, rebin_fan
 from rift_cl.reconstruct.direct.offset_axis import (
     is_full_turn,
     is_offset,
     is_uneven,
+    seen_bins,
     widened,
 )
 from rift_cl.reconstruct.direct.padding import extended, is_truncated, wider
@@ -146,10 +144,7 @@ class SliceInput:
     @property
     def bins(self) -> int:
         """Bins between the farther end of the detector and its mirror image, or the detector's."""
-        scan = self.geometry
-        if not self.offset:
-            return scan.bins
-        return scan.bins + int(np.ceil(abs(scan.bins - 1 - 2 * scan.center)))
+        return seen_bins(self.geometry) if self.offset else self.geometry.bins
 
     @property
     def settled(self) -> bool:
@@ -216,30 +211,22 @@ class SliceInput:
         given = self.settings.center
         if self.fan is not None:
             return [] if given is None else doubted_circle(self.file, given, self.device)
-        found = None
-        if given is not None:
-            with suppress(RiftError):  # data that do not tell the axis have nothing against one
-                found = find_axis(self.file, self.device)
-        doubt = angle_doubt(row, self.scan.angles) if found is None else found.doubt
-        doubts = [f"Doubt: {doubt}."] if doubt else []
-        if found is None or given is None:
-            return doubts
-        tilt = doubted_tilt(found, self.spanned, self.tilt)
-        return doubts + doubted_center(self._at_middle(found), given) + tilt
+        block = row_binning(self.file, self.settings.binning)
+        middle = binned_center((self.file.shape[1] - 1) / 2, block)
+        return doubted_parallel(
+            self.file,
+            row,
+            given,
+            self.tilt,
+            away=block * (sum(self.rows) // 2 - middle),
+            spanned=self.spanned,
+            device=self.device,
+        )
 
     @property
     def spanned(self) -> int:
         """How many of the file's rows lie between the outermost slices, these included."""
         return (self.rows[1] - self.rows[0]) * row_binning(self.file, self.settings.binning)
-
-    def _at_middle(self, found: AxisEstimate) -> AxisEstimate:
-        """What the data tell of the middle slice, for the middle of the detector."""
-        block = row_binning(self.file, self.settings.binning)
-        away = block * (sum(self.rows) // 2 - binned_center((self.file.shape[1] - 1) / 2, block))
-        tilt = found.tilt if found.tilt_is_sure else 0.0
-        moved = (tilt - math.tan(math.radians(self.tilt))) * away
-        center, low, high = (place + moved for place in (found.center, *found.interval))
-        return dataclasses.replace(found, center=center, interval=(low, high))
 
     def _noise_note(self, row: Floats) -> list[str]:
         """What least squares that stop at no noise make of noisy data, and where they would."""
@@ -457,12 +444,8 @@ def _axis_note(source: SliceInput) -> list[str]:
         return list(source.settled_by.notes)
     if source.estimate is None:
         return [f"The rotation axis was found before, at bin {source.center:.2f}."]
-    rows, said = source.file.shape[1], source.settings.tilt
-    if said is None:
-        tilt = unsure_tilt(source.estimate, rows)
-    else:
-        tilt = doubted_tilt(source.estimate, source.spanned, said)
-    return [f"The rotation axis was found {source.estimate.in_words()}.", *tilt]
+    rows, tilt = source.file.shape[1], source.settings.tilt
+    return found_in_words(source.estimate, rows, source.spanned, tilt)
 
 
 def _pitch_note(source: SliceInput) -> list[str]:
@@ -520,17 +503,13 @@ def _stitched_note(source: SliceInput) -> str:
 
 
 def _offset_note(source: SliceInput) -> str:
-    off = (
-        f"The axis, bin {source.axis['center']:.2f}, is off the middle of the detector in a "
-        "full turn"
-    )
     # Iterative methods use every view as it is.
-    joined = "" if source.settings.iterative else "opposite views were combined, and "
     beyond = (
         " The object reaches beyond that end as well: values near the border of the field of view "
         "are too large."
     )
-    return f"{off}: {joined}slices extend to the farther end.{beyond if source.beyond else ''}"
+    words = offset_in_words(source.axis["center"], combined=not source.settings.iterative)
+    return f"{words}{beyond if source.beyond else ''}"
 
 
 def _wide_note(source: SliceInput) -> str:

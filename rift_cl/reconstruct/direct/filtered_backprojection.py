@@ -24,12 +24,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rift_cl.errors import InputError
-from rift_cl.geometry import Vectors
+from rift_cl.geometry import Parallel, Vectors
 from rift_cl.geometry.numbers import one_number
 from rift_cl.geometry.seen_grid import scan_lengths
 from rift_cl.operators.algebra import Scaled
 from rift_cl.operators.composite import Composite
-from rift_cl.operators.filters.compensation import Compensation
+from rift_cl.operators.filters.compensation import COMPENSATIONS, Compensation
 from rift_cl.operators.filters.ramp_filters import (
     FilterLike,
     Gains,
@@ -50,7 +50,12 @@ from rift_cl.reconstruct.direct.fdk import (
     slices_of,
 )
 from rift_cl.reconstruct.direct.katsevich import Katsevich, cone_inversion
-from rift_cl.reconstruct.direct.offset_axis import is_weighed, offset_weights, widened_scan
+from rift_cl.reconstruct.direct.offset_axis import (
+    is_offset,
+    is_weighed,
+    offset_weights,
+    widened_scan,
+)
 from rift_cl.reconstruct.direct.ray_factors import RayFactors
 from rift_cl.reconstruct.direct.view_weights import view_gains
 
@@ -105,7 +110,7 @@ class FilteredBackprojection(Composite):
             A.scan,
             chosen,
             rows=A.range[1] if len(A.range) == 3 else None,
-            gains=_scaled(view_gains(A.scan.angles, compensate, size), _unspread(A)),
+            gains=_scaled(_gains(self._given.scan, compensate, size), _unspread(A)),
             device=A.device,
             dtype=A.dtype,
         )
@@ -306,6 +311,17 @@ def object_diameter(A: ParallelProjector) -> float:
     """Diameter of the circle in the grid that the detector sees, in the grid's unit of length."""
     edges = (n * d for n, d in zip(A.grid.shape[-2:], A.grid.spacing[-2:], strict=True))
     return min(*edges, A.scan.bins * A.scan.pitch)
+
+
+def _gains(scan: Parallel, compensate: str | None, diameter: float) -> Floats | Compensation:
+    """What each view stands for, as ``view_gains`` has it of the scan's directions.
+
+    A view of a half acquisition shows what is on its own side of the axis. Where the one from the
+    opposite side is missing it shows no more, so that it stands for its share of the whole circle.
+    """
+    own_side = compensate not in COMPENSATIONS and is_offset(scan)
+    # Twice around for halves of angles is once around.
+    return view_gains(scan.angles / 2 if own_side else scan.angles, compensate, diameter)
 
 
 def _scaled(gains: Floats | Compensation, factor: float) -> Gains:

@@ -31,8 +31,10 @@ _EVEN, _SHARE, _FEWEST_BINS = 0.5, 0.2, 12.0
 # two that were lost, and the jitter of a turntable, leave it what it is.
 _SLACK, _HOLE = 1.5, np.pi / 36
 # A wider gap is no end of a span where another is at least this share of it, as between angles
-# that are uneven all round; up to this angle.
-_ALIKE, _WIDEST = 0.5, np.pi / 12
+# that are uneven all round; up to this angle, or so many median steps. Where every Nth view is
+# left out gaps are two steps wide, and one is three where the first view and the last are left out.
+# Of so few views that this may be half a turn and more, none is said to be left out.
+_ALIKE, _WIDEST, _REGULAR = 0.5, np.pi / 12, 3.0
 # Angles closer than this are the same, in radians.
 _SAME = 1e-6
 
@@ -42,13 +44,15 @@ def is_full_turn(angles: Floats) -> bool:
     circle = np.sort(np.mod(angles, 2 * np.pi))
     gaps = np.diff(circle, append=circle[0] + 2 * np.pi)
     # Turns that repeat each other differ by rounding.
-    distinct = max(int(np.count_nonzero(gaps > _SAME)), 1)
+    steps = gaps[gaps > _SAME]
     if angles.size <= 2:
         return False
     second, widest = np.partition(gaps, -2)[-2:]
-    if second >= _ALIKE * widest:
-        return bool(widest <= max(_SLACK * 2 * np.pi / distinct, _WIDEST))
-    return bool(widest <= max(_SLACK * 2 * np.pi / distinct, _HOLE))
+    most = _SLACK * 2 * np.pi / max(steps.size, 1)
+    if second < _ALIKE * widest - _SAME:
+        return bool(widest <= max(most, _HOLE))
+    holes = _REGULAR * float(np.median(steps)) if steps.size > 2 * _REGULAR else 0.0
+    return bool(widest <= max(most, _WIDEST, holes) + _SAME)
 
 
 def is_offset(scan: Parallel | Fan) -> bool:
@@ -60,6 +64,15 @@ def sees_further(center: float, bins: int) -> bool:
     """Whether a detector reaches much further on one side of the axis, and beyond it on both."""
     short, long = sorted((center, bins - 1 - center))
     return 0 < short < _OFFSET * long
+
+
+def seen_bins(scan: Parallel | Fan) -> int:
+    """Bins of a detector that shows what a scan does on both sides of its axis.
+
+    Of a full turn with an offset axis that is one to the farther end on either side, otherwise the
+    scan's own.
+    """
+    return scan.bins + (_missing(scan) if is_offset(scan) else 0)
 
 
 def is_uneven(center: float, bins: int) -> bool:
@@ -151,13 +164,17 @@ def widened(projections: Stack, scan: Parallel) -> tuple[Stack, Parallel]:
 
 def widened_scan(scan: Parallel) -> tuple[Parallel, int]:
     """The scan of a detector as wide as twice the longer side, and how many bins come before."""
-    longer = _right_over_left(scan)
-    missing = int(np.ceil(abs(longer)))
-    before = missing if longer > 0 else 0
+    missing = _missing(scan)
+    before = missing if _right_over_left(scan) > 0 else 0
     bins = scan.bins + missing
     return Parallel(scan.angles, bins, scan.pitch, scan.center + before), before
 
 
-def _right_over_left(scan: Parallel) -> float:
+def _missing(scan: Parallel | Fan) -> int:
+    """Bins that the shorter side of a detector lacks of the longer one."""
+    return int(np.ceil(abs(_right_over_left(scan))))
+
+
+def _right_over_left(scan: Parallel | Fan) -> float:
     """Bins that a detector has after the axis beyond those before it."""
     return scan.bins - 1 - scan.center - scan.center
