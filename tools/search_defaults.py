@@ -131,6 +131,8 @@ _OF_XRAYS: dict[str, Settings] = {
         )
         for word, factor in (("x 2", 2), ("/ 2", 0.5))
     },
+    "positions / 4": times(0.25, _MEANS, usual=_XRAY),
+    "positions and densities / 2": times(0.5, _MEANS, _LOGITS, usual=_XRAY),
     "positions hold longer": {"learning_rates.means_last": 0.5},
     "shapes fall": {"learning_rates.shapes_last": 0.25},
     "cooldown 0.25": {"cooldown": 0.25},
