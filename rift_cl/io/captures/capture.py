@@ -19,7 +19,7 @@ from rift_cl.io.captures.photograph_folder import (
 from rift_cl.io.captures.transforms_json import open_transforms
 from rift_cl.io.captures.video import is_video
 from rift_cl.io.captures.view import Capture, View, as_pinholes, camera_at
-from rift_cl.io.captures.view_image import read_view
+from rift_cl.io.captures.view_image import read_known_view, read_view
 
 __all__ = [
     "Capture",
@@ -30,6 +30,7 @@ __all__ = [
     "holds_bare_photographs",
     "holds_capture",
     "open_capture",
+    "read_known_view",
     "read_view",
 ]
 
