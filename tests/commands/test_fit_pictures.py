@@ -6,6 +6,7 @@ import threading
 
 import numpy as np
 import pytest
+from skimage.metrics import structural_similarity
 from view_files import linear, store, view_of
 
 import rift_cl as rift
@@ -230,6 +231,38 @@ def test_pixels_that_do_not_count_change_no_score():
     assert found[0] == found[1]
     right = scores_of(image[:, 9:], truth[:, 9:], (None, None), "fit")
     assert found[0]["fit_psnr"] == pytest.approx(right["fit_psnr"], abs=1e-9)
+
+
+@pytest.mark.parametrize("share", [0.6, 0.1])
+def test_every_score_is_a_mean_over_the_pixels_that_count(share):
+    """The same noise everywhere: a smaller mask makes no score better."""
+    random = np.random.default_rng(0)
+    truth = random.uniform(0, 1, (40, 60, 3)).astype(np.float32)
+    image = np.clip(truth + 0.2 * random.normal(size=truth.shape), 0, 1).astype(np.float32)
+    counted = np.zeros((40, 60), bool)
+    counted[:, : round(60 * share)] = True
+    asked = []
+
+    def more(image, truth, mask):
+        asked.append(mask)
+
+    found = scores_of(image, truth, (counted, None), "fit", {"lpips": more})
+    assert asked[0] is counted and set(found) == {"fit_psnr", "fit_ssim"}
+    shown = np.where(counted[..., None], image, truth)
+    maps = [
+        structural_similarity(
+            *(np.float64(a[..., c]) for a in (shown, truth)),
+            data_range=1,
+            gaussian_weights=True,
+            sigma=1.5,
+            use_sample_covariance=False,
+            full=True,
+        )[1][counted].mean()
+        for c in range(3)
+    ]
+    assert found["fit_ssim"] == pytest.approx(np.mean(maps), abs=1e-12)
+    whole = scores_of(image, truth, (None, None), "fit")
+    assert found["fit_ssim"] == pytest.approx(whole["fit_ssim"], abs=0.1)
 
 
 def test_linear_light_is_fitted_and_shown_for_a_display(tmp_path):

@@ -13,6 +13,8 @@ from rift_cl.commands.evaluate.report import eval_page
 from rift_cl.commands.evaluate.settings import EvalSettings
 from rift_cl.commands.fit_photos.pictures import CapturePictures
 from rift_cl.commands.fit_photos.scores import (
+    Floats,
+    Mask,
     Score,
     ViewScore,
     error_record,
@@ -59,6 +61,8 @@ class Evaluation:
             camera_at(view, self.downscale)
         self.device = settings.open_device()
         self.folder = RunFolder.of(settings, "eval")
+        # What is to be said of the scores once they are there, a sentence each.
+        self.notes: list[str] = []
         self.metrics: dict[str, Any] = {}
         self.scores: dict[str, list[ViewScore]] = {}
 
@@ -77,7 +81,7 @@ class Evaluation:
         more: dict[str, Score] = {}
         if self.settings.flip:
             flip_evaluator()
-            more["flip"] = flip
+            more["flip"] = _flip
         if self.settings.lpips is not None:
             more["lpips"] = _lpips(self.settings.lpips)
         return more
@@ -185,6 +189,7 @@ class Evaluation:
         self.scores = {name: scores for name, scores in self.scores.items() if scores}
         if not self.scores:
             raise InputError(f"{self.scene.name}: every mask is black, there is nothing to score")
+        self.notes = self._left_out()
         self.metrics = {
             "splats": len(self.scene.splats),
             "eps2d": self.scene.rendering.eps2d,
@@ -192,8 +197,19 @@ class Evaluation:
             **score_record(self.scores),
             **error_record(self.scores),
         }
-        page = eval_page(self.scene.name, self.scores, self.metrics)
+        page = eval_page(self.scene.name, self.scores, self.metrics, self.notes)
         self.folder.finish(self.decided, self.metrics, page, self.device, asked=self.settings)
+
+    def _left_out(self) -> list[str]:
+        """A sentence about pictures that a score has no meaning of."""
+        scores = [score for group in self.scores.values() for score in group]
+        lacking = sum("fit_lpips" not in score.values for score in scores)
+        if "lpips" not in self.more or not lacking:
+            return []
+        return [
+            f"LPIPS is left out for {lacking} of {len(scores)} photographs, whose pixels do not "
+            "all count (a mask, or a lens): it has no map that could be averaged over the others"
+        ]
 
     def _pictures(
         self, views: tuple[View, ...], like: CapturePictures | None = None
@@ -207,8 +223,14 @@ class Evaluation:
         return pictures
 
 
+def _flip(image: Floats, truth: Floats, counted: Mask | None) -> float:
+    return flip(image, truth, mask=counted)
+
+
 def _lpips(weights: Path) -> Score:
-    """LPIPS with weights from a file.
+    """LPIPS with weights from a file, of pictures all of whose pixels count.
+
+    Its features look at so much of a picture that none of them is of the pixels that count alone.
 
     Raises:
         InputError: torch is missing, or the weights cannot be read.
@@ -219,4 +241,5 @@ def _lpips(weights: Path) -> Score:
         )
     from rift_cl.interop.lpips import Lpips
 
-    return Lpips(weights)
+    lpips = Lpips(weights)
+    return lambda image, truth, counted: lpips(image, truth) if counted is None else None

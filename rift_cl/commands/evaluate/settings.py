@@ -37,7 +37,8 @@ class EvalInput(SceneInput):
     install flip-evaluator)."""
     lpips: Auto[Path] = None
     """Also score LPIPS (0 is equal), with the network's weights from this file: torch.save of the
-    state_dict() of lpips.LPIPS, net 'alex' or 'vgg'. Needs torch. Default: no LPIPS."""
+    state_dict() of lpips.LPIPS, net 'alex' or 'vgg'. Needs torch. Left out for photographs that a
+    mask or a lens leaves only a part of. Default: no LPIPS."""
 
 
 @dataclass(frozen=True, kw_only=True)
