@@ -22,6 +22,7 @@ from rift_cl.commands.fit_photos.scores import (
     score_views,
 )
 from rift_cl.commands.fit_photos.view_split import open_seen, split_views
+from rift_cl.commands.inputs.opened_scene import in_display_light
 from rift_cl.commands.options import absolute_paths
 from rift_cl.commands.run_folder.run_folder import RunFolder
 from rift_cl.errors import InputError
@@ -61,10 +62,12 @@ class Evaluation:
             camera_at(view, self.downscale)
         self.device = settings.open_device()
         self.folder = RunFolder.of(settings, "eval")
-        # What is to be said of the scores once they are there, a sentence each.
+        # What is to be said of how pictures were scored, a sentence each.
         self.notes: list[str] = []
         self.metrics: dict[str, Any] = {}
         self.scores: dict[str, list[ViewScore]] = {}
+        # What pictures of each group are drawn over, in the scene's light.
+        self.backgrounds: dict[str, Floats] = {}
 
     @property
     def decided(self) -> EvalSettings:
@@ -170,6 +173,8 @@ class Evaluation:
             "trained on": trained,
             "downscale": str(self.downscale),
             "eps2d": f"{self.scene.rendering.eps2d:g}",
+            "background": self._told
+            or "the common border of the scored photographs, or black without one",
             "scores": ", ".join(["PSNR", "SSIM", *(name.upper() for name in self.more)]),
             "device": self.device.name,
         }
@@ -182,23 +187,41 @@ class Evaluation:
         self.folder.make()
         for name, views in self.groups.items():
             test = self._pictures(views, training)
-            self.scores[name] = []
+            self.scores[name], self.backgrounds[name] = [], test.behind
+            self.notes.append(self._background_note(name, test))
             for score in score_views(renderer, splats, test, training, self.more):
                 self.scores[name].append(score)
                 yield Report(len(self.scores[name]), len(views), f"views of {name}")
         self.scores = {name: scores for name, scores in self.scores.items() if scores}
         if not self.scores:
             raise InputError(f"{self.scene.name}: every mask is black, there is nothing to score")
-        self.notes = self._left_out()
+        self.notes += self._left_out()
         self.metrics = {
             "splats": len(self.scene.splats),
             "eps2d": self.scene.rendering.eps2d,
             "downscale": self.downscale,
+            "background": {name: color.tolist() for name, color in self.backgrounds.items()},
             **score_record(self.scores),
             **error_record(self.scores),
         }
         page = eval_page(self.scene.name, self.scores, self.metrics, self.notes)
         self.folder.finish(self.decided, self.metrics, page, self.device, asked=self.settings)
+
+    @property
+    def _told(self) -> str | None:
+        """Who says what is behind the splats; None where nobody does."""
+        if self.settings.background is not None:
+            return "as --background says"
+        return None if self.scene.told_background is None else "the background of the fit"
+
+    def _background_note(self, name: str, pictures: CapturePictures) -> str:
+        """A sentence about what the pictures of a group are drawn over."""
+        found = "black, since the photographs have no common border"
+        if pictures.border is not None:
+            found = "the common border of the photographs"
+        color = in_display_light(pictures.behind, self.scene.light)
+        shown = " ".join(f"{value:.3g}" for value in color)
+        return f"pictures of {name} are drawn over {shown}, {self._told or found}"
 
     def _left_out(self) -> list[str]:
         """A sentence about pictures that a score has no meaning of."""
@@ -214,13 +237,14 @@ class Evaluation:
     def _pictures(
         self, views: tuple[View, ...], like: CapturePictures | None = None
     ) -> CapturePictures:
-        light = self.scene.light
-        pictures = CapturePictures(
-            self.device, views, downscale=self.downscale, light=light, like=like
+        return CapturePictures(
+            self.device,
+            views,
+            downscale=self.downscale,
+            light=self.scene.light,
+            like=like,
+            background=self.scene.told_background,
         )
-        if self.settings.background is not None:
-            pictures.behind = self.scene.background
-        return pictures
 
 
 def _flip(image: Floats, truth: Floats, counted: Mask | None) -> float:
