@@ -8,7 +8,7 @@ from pathlib import Path
 
 from rift_cl.errors import InputError
 from rift_cl.io.boundary import reading
-from rift_cl.io.captures.capture_notes import color_notes
+from rift_cl.io.captures.capture_notes import color_notes, part_notes
 from rift_cl.io.captures.colmap_model import MODEL_FOLDERS, find_model, open_model
 from rift_cl.io.captures.photograph_folder import (
     other_files,
@@ -72,7 +72,10 @@ def open_capture(
         path = _absolute(path)
         file = _transforms(path)
         if file is not None and images is None:
-            return _told(open_transforms(file, photographs=photographs), photographs)
+            capture = open_transforms(file, photographs=photographs)
+            if file != path and file.name == _TRANSFORMS[1]:
+                capture = replace(capture, notes=(*capture.notes, *part_notes(file)))
+            return _told(capture, photographs)
         model = find_model(path)
     if model is not None:
         folder = None if images is None else photographs_in(Path(images))
