@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 import math
 import sys
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -132,6 +133,20 @@ def test_flip_is_nothing_for_equal_pictures_and_nearly_all_for_black_and_white()
     noise = np.random.default_rng(2).uniform(-0.1, 0.1, image.shape)
     far, near = (metrics.flip(image + noise, image, pixels_per_degree=p) for p in (200, 20))
     assert 0 < far < near < metrics.flip(image + 2 * noise, image, pixels_per_degree=20) < 1
+
+
+def test_flip_of_a_part_is_the_mean_of_its_map_there(monkeypatch):
+    errors = np.random.default_rng(3).random((4, 5, 1), np.float32)
+    module = SimpleNamespace(evaluate=lambda *pair, **more: (errors, 0.25, {}))
+    monkeypatch.setitem(sys.modules, "flip_evaluator", module)
+    image, mask = np.zeros((4, 5, 3)), np.zeros((4, 5), bool)
+    mask[1:3, :2] = True
+    assert metrics.flip(image, image) == 0.25
+    wanted = errors[1:3, :2].mean(dtype=float)
+    assert metrics.flip(image, image, mask=mask) == pytest.approx(wanted, abs=1e-12)
+    for wrong, words in ((0 * mask, "bool"), (mask[1:], "mask has shape"), (mask & False, "false")):
+        with pytest.raises(RiftError, match=words):
+            metrics.flip(image, image, mask=wrong)
 
 
 @pytest.mark.parametrize(

@@ -350,6 +350,7 @@ def _eval(settings: Any, output: Output) -> None:
     if not ran(job, settings, output):
         return
     print_table(*score_table(job.metrics), caption=SCORING)
+    _print_notes(job.notes)
     print(f"report.html and metrics.json are in {settings.out}")
 
 

@@ -158,7 +158,9 @@ def evaluate(
         given = {"scene": scene, "captures": tuple(captures), "out": folder, **settings}
         job = Evaluation(_settings(given, "eval", EvalSettings))
         _run(job, progress)
-        return keep(Scored(folder, job.decided, dict(job.metrics), (), scores=job.scores))
+        return keep(
+            Scored(folder, job.decided, dict(job.metrics), tuple(job.notes), scores=job.scores)
+        )
 
 
 def render(

@@ -17,6 +17,7 @@ if TYPE_CHECKING:
         camera_at,
         holds_bare_photographs,
         open_capture,
+        read_known_view,
         read_view,
     )
     from rift_cl.io.captures.photographs import (
@@ -55,6 +56,7 @@ __all__ = [
     "open_volume",
     "pose_photographs",
     "read_image",
+    "read_known_view",
     "read_view",
     "read_volume",
     "register_scan_reader",
@@ -76,6 +78,7 @@ __getattr__, __dir__ = lazy_names(
             "camera_at",
             "holds_bare_photographs",
             "open_capture",
+            "read_known_view",
             "read_view",
         ),
         "captures.photographs": ("PosedPhotographs", "check_photographs", "pose_photographs"),

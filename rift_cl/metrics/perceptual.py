@@ -10,9 +10,9 @@ import math
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
-from rift_cl.errors import InputError, ShapeError
+from rift_cl.errors import DTypeError, InputError, ShapeError
 from rift_cl.metrics.scores import finite_values
 
 # 0.7 m before a monitor of 3840 pixels and 0.7 m across, as the paper has it.
@@ -20,7 +20,11 @@ PIXELS_PER_DEGREE = 67.0
 
 
 def flip(
-    image: ArrayLike, truth: ArrayLike, *, pixels_per_degree: float = PIXELS_PER_DEGREE
+    image: ArrayLike,
+    truth: ArrayLike,
+    *,
+    pixels_per_degree: float = PIXELS_PER_DEGREE,
+    mask: ArrayLike | None = None,
 ) -> float:
     """Mean of the FLIP error map (Andersson et al., Proc. ACM CGIT 3(2), 2020).
 
@@ -30,13 +34,17 @@ def flip(
         truth: what it should be, of the same shape.
         pixels_per_degree: of the observer's field of view; a larger number is a person who is
             further away and sees less.
+        mask: (height, width) booleans, the pixels over which the map is averaged; all when not
+            given. The map's filters look at the others too: put the truth there if nothing that
+            they hold should count.
 
     Returns:
         From 0, for equal pictures, to 1; about 0.97 for black in place of white.
 
     Raises:
-        ShapeError: the shapes differ, or an array is no colour picture.
-        DTypeError: an array is not real.
+        ShapeError: the shapes differ, an array is no colour picture, or the mask is false
+            everywhere.
+        DTypeError: an array is not real, or the mask not boolean.
         NonFiniteError: an array holds NaN or infinity.
         InputError: ``pixels_per_degree`` is not a positive number, or the package
             ``flip-evaluator`` is not installed.
@@ -51,10 +59,26 @@ def flip(
         raise InputError(
             f"flip: pixels_per_degree is {pixels_per_degree!r}, wanted a positive number"
         )
+    counts = None if mask is None else _checked_mask(mask, found.shape[:2])
     evaluate = flip_evaluator().evaluate
     pair = [np.ascontiguousarray(np.clip(a, 0, 1), np.float32) for a in (wanted, found)]
-    *_, mean, _ = evaluate(*pair, "LDR", applyMagma=False, parameters={"ppd": pixels_per_degree})
-    return float(mean)
+    errors, mean, _ = evaluate(
+        *pair, "LDR", applyMagma=False, parameters={"ppd": pixels_per_degree}
+    )
+    if counts is None:
+        return float(mean)
+    return float(np.mean(np.asarray(errors, np.float64).reshape(counts.shape)[counts]))
+
+
+def _checked_mask(mask: ArrayLike, shape: tuple[int, ...]) -> NDArray[np.bool_]:
+    counts = np.asarray(mask)
+    if counts.dtype != np.bool_:
+        raise DTypeError(f"mask has type {counts.dtype}, wanted bool: compare it with a number")
+    if counts.shape != shape:
+        raise ShapeError(f"flip: mask has shape {counts.shape}, wanted (height, width), {shape}")
+    if not counts.any():
+        raise ShapeError("flip: nothing to compare, the mask is false everywhere")
+    return counts
 
 
 def flip_evaluator() -> Any:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+import shutil
 import sys
 from types import SimpleNamespace
 
@@ -14,7 +15,7 @@ from test_trainer import Ball
 import rift_cl as rift
 from rift_cl.commands.cli import main
 from rift_cl.io.captures.transforms_record import transforms_of
-from rift_cl.io.images.image import write_png
+from rift_cl.io.images.image import read_image, write_png
 from rift_cl.io.output import write_json
 
 
@@ -90,6 +91,77 @@ def test_how_splats_are_drawn_changes_the_scores(capture, fitted, tmp_path):
         assert evaluate(fitted, tmp_path / name, capture, *more) == 0
     own, soft = (metrics_of(tmp_path / name)["scores"][capture.name] for name in ("own", "soft"))
     assert abs(own["fit_psnr"] - soft["fit_psnr"]) > 0.01
+
+
+def without_border(capture, folder):
+    """The middle of every photograph alone, which the ball fills."""
+    folder.mkdir()
+    record = json.loads((capture / "transforms.json").read_text())
+    for frame in record["frames"]:
+        frame |= {"w": 20, "h": 16, "cx": 10, "cy": 8}
+        image = read_image(capture / frame["file_path"])
+        write_png(folder / frame["file_path"], image[22:38, 30:50])
+    write_json(folder / "transforms.json", record)
+    return folder
+
+
+def test_the_background_is_the_fits_whether_or_not_its_photographs_are_there(
+    capture, fitted, tmp_path, capsys
+):
+    near = without_border(capture, tmp_path / "near")
+    config = json.loads((fitted / "config.json").read_text())
+    config["photographs"] |= {"folder": str(tmp_path / "gone"), "from_fit": "gone"}
+    lone = shutil.copytree(fitted, tmp_path / "lone")
+    (lone / "config.json").write_text(json.dumps(config))
+    wanted, found = metrics_of(fitted)["background"], []
+    assert wanted == pytest.approx([0.5] * 3, abs=0.01)
+    for number, fit in enumerate((fitted, lone)):
+        assert evaluate(fit, tmp_path / str(number), near) == 0
+        assert "the background of the fit" in capsys.readouterr().err
+        scores = metrics_of(tmp_path / str(number))
+        assert scores["background"] == {"near": wanted}
+        found.append(scores["views"]["near"])
+    # Photographs that are gone are at no angle.
+    assert [views[0]["angle"] is not None for views in found] == [True, False]
+    assert [view["fit_psnr"] for view in found[0]] == [view["fit_psnr"] for view in found[1]]
+
+
+@pytest.mark.parametrize(
+    ("given", "more", "level", "words"),
+    [
+        ("capture", (), 0.5, "the common border of the photographs"),
+        ("near", (), 0.0, "black, since the photographs have no common border"),
+        ("capture", ("--background", 1, 1, 1), 1.0, "as --background says"),
+    ],
+)
+def test_the_background_of_a_file_is_the_photographs_border_or_black(
+    capture, fitted, tmp_path, capsys, given, more, level, words
+):
+    scored = capture if given == "capture" else without_border(capture, tmp_path / "near")
+    assert evaluate(fitted / "scene.ply", tmp_path / "scores", scored, *more) == 0
+    assert words in capsys.readouterr().err
+    assert words in (tmp_path / "scores" / "report.html").read_text()
+    (found,) = metrics_of(tmp_path / "scores")["background"].values()
+    assert found == pytest.approx([level] * 3, abs=0.01)
+
+
+def test_lpips_is_left_out_where_pixels_do_not_count_and_that_is_said(
+    capture, fitted, tmp_path, monkeypatch, capsys
+):
+    """It has no map that could be averaged over the pixels that count."""
+    torch = SimpleNamespace(__spec__=True)
+    network = SimpleNamespace(Lpips=lambda weights: lambda image, truth: 0.125)
+    monkeypatch.setitem(sys.modules, "torch", torch)
+    monkeypatch.setitem(sys.modules, "rift_cl.interop.lpips", network)
+    masked = shutil.copytree(capture, tmp_path / "masked")
+    mask = np.ones((60, 80))
+    for number in (0, 5):
+        mask[:, :20] = 0
+        write_png(masked / f"{number}_mask.png", mask)
+    assert evaluate(fitted, tmp_path / "scores", masked, "--lpips", tmp_path / "any.pth") == 0
+    assert "LPIPS is left out for 2 of 8 photographs" in capsys.readouterr().err
+    found = metrics_of(tmp_path / "scores")["views"]["masked"]
+    assert [number for number, v in enumerate(found) if "fit_lpips" not in v] == [0, 5]
 
 
 def test_a_dry_run_says_what_would_be_scored(capture, fitted, tmp_path, capsys):

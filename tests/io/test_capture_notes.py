@@ -88,6 +88,23 @@ def test_a_principal_point_far_from_the_middle_is_doubted(
     assert not doubted or f"1 of 3 photographs is far from the middle, such as ({cx:g}," in found[0]
 
 
+@pytest.mark.parametrize("parts", [["test"], ["val", "test"]])
+def test_the_files_beside_a_training_file_are_named(tmp_path: Path, parts: list[str]) -> None:
+    """NeRF's synthetic scenes: the folder stands for what is trained on, its test file waits."""
+    train = made.transforms(tmp_path).rename(tmp_path / "transforms_train.json")
+    assert open_capture(tmp_path).notes == ()
+    files = [tmp_path / f"transforms_{part}.json" for part in parts]
+    for file in files:
+        file.write_text(train.read_text())
+    found = note(tmp_path)
+    assert all(file.name in found for file in files)
+    assert f"--test {' '.join(map(str, files))} --hold-out 0" in found
+    # Whoever names a file has chosen, and transforms.json comes before its parts.
+    assert open_capture(train).notes == open_capture(files[0]).notes == ()
+    (tmp_path / "transforms.json").write_text(train.read_text())
+    assert open_capture(tmp_path).notes == ()
+
+
 def with_profile(path: Path, name: str, kind: str = "sRGB") -> Path:
     """A picture with a profile of this name; all of Pillow's are as long as 'sRGB built-in'."""
     profile = ImageCms.ImageCmsProfile(ImageCms.createProfile(kind)).tobytes()

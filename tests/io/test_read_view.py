@@ -10,7 +10,7 @@ import pytest
 from view_files import HEIGHT, WIDTH, K, display, linear, store, view_of
 
 from rift_cl.geometry.camera import Camera
-from rift_cl.io import camera_at, read_image, read_view, write_png
+from rift_cl.io import camera_at, read_image, read_known_view, read_view, write_png
 
 RANDOM = np.random.default_rng(5)
 
@@ -130,6 +130,47 @@ def test_a_mask_is_multiplied_into_alpha(tmp_path: Path, channels: int) -> None:
         np.testing.assert_allclose(image[..., :3], codes[..., :3] / 255, atol=1e-6)
         alpha = codes[..., 3:] / 255 if count == 4 else 1
         np.testing.assert_allclose(image[..., 3:], cover * alpha, atol=1e-6)
+
+
+@pytest.mark.parametrize("downscale", [1, 4])
+def test_what_is_masked_out_is_told_from_what_is_transparent(
+    tmp_path: Path, downscale: int
+) -> None:
+    """Alpha and colours are means of what the mask leaves; their product is that of read_view."""
+    light = RANDOM.uniform(0, 1, (HEIGHT, WIDTH, 4)).astype(np.float32)
+    mask = RANDOM.integers(0, 256, (HEIGHT, WIDTH, 1), dtype=np.uint8)
+    light[:8, :8, 3], mask[:8, 8:16] = 0, 0
+    write_png(tmp_path / "mask.png", mask)
+    path = store(tmp_path / "a.tif", light, "float", **{"oiio:UnassociatedAlpha": 1})
+    view = view_of(path, tmp_path / "mask.png")
+    image, known = read_known_view(view, downscale=downscale, light="linear")
+
+    def mean(values: np.ndarray) -> np.ndarray:
+        blocks = (HEIGHT // downscale, downscale, WIDTH // downscale, downscale, -1)
+        return values.reshape(blocks).mean((1, 3))
+
+    share, alpha = mask / 255, light[..., 3:]
+    np.testing.assert_allclose(known, mean(share)[..., 0], atol=1e-6)
+    seen, shown = mean(share) > 0, mean(share * alpha) > 0
+    wanted = mean(share * alpha)[seen] / mean(share)[seen]
+    np.testing.assert_allclose(image[seen[..., 0]][:, 3], wanted, atol=1e-5)
+    wanted = mean(share * alpha * light[..., :3]) / np.maximum(mean(share * alpha), 1e-9)
+    some = shown[..., 0]
+    np.testing.assert_allclose(image[some][:, :3], wanted[some], atol=1e-5)
+    both = read_view(view, downscale=downscale, light="linear")
+    np.testing.assert_allclose(both[..., 3], mean(share * alpha)[..., 0], atol=1e-6)
+    np.testing.assert_array_equal(both[some][:, :3], image[some][:, :3])
+    corner = 8 // downscale
+    assert not image[:corner, :corner, 3].any() and known[:corner, :corner].any()
+    assert not known[:corner, corner : 2 * corner].any()
+
+
+def test_all_of_a_photograph_without_mask_and_lens_is_known(tmp_path: Path) -> None:
+    write_png(tmp_path / "a.png", RANDOM.integers(0, 256, (HEIGHT, WIDTH, 4), dtype=np.uint8))
+    view = view_of(tmp_path / "a.png")
+    image, known = read_known_view(view)
+    assert known is None
+    np.testing.assert_array_equal(image, read_view(view))
 
 
 @pytest.mark.parametrize("color", [0, 90, 255])

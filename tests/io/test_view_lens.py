@@ -10,7 +10,7 @@ from view_files import HEIGHT, WIDTH, K, store, view_of
 
 from rift_cl.geometry.camera import Camera
 from rift_cl.geometry.lens_distortion import Lens
-from rift_cl.io import camera_at, read_view, write_png
+from rift_cl.io import camera_at, read_known_view, read_view, write_png
 
 LENSES = {
     "OPENCV": (-0.2, 0.05, 0.002, -0.003),
@@ -95,6 +95,23 @@ def test_where_the_photograph_does_not_reach_alpha_is_zero(tmp_path: Path) -> No
     np.testing.assert_array_equal(image[..., 3], inside)
     np.testing.assert_allclose(image[inside][:, :3], 200 / 255, atol=1e-6)
     assert not image[~inside].any() and 0.1 < inside.mean() < 0.9
+
+
+def test_where_a_photograph_with_alpha_does_not_reach_nothing_is_known(tmp_path: Path) -> None:
+    """Its transparent half is known to be empty; beyond its edges nobody knows."""
+    lens = Lens("SIMPLE_RADIAL", (0.3,), [[70, 0, 40], [0, 70, 30], [0, 0, 1]])
+    codes = np.full((HEIGHT, WIDTH, 4), 200, np.uint8)
+    codes[:, : WIDTH // 2, 3] = 0
+    write_png(tmp_path / "a.png", codes)
+    write_png(tmp_path / "b.png", codes[..., :3])
+    image, known = read_known_view(view_of(tmp_path / "a.png", lens=lens))
+    plain, reached = read_known_view(view_of(tmp_path / "b.png", lens=lens))
+    np.testing.assert_array_equal(known, reached)
+    assert 0.1 < known.mean() < 0.9 and plain.shape[2] == 3
+    inside = known > 0
+    assert not image[:, : WIDTH // 2 - 1, 3].any()
+    right = inside & (np.arange(WIDTH) > WIDTH // 2)
+    np.testing.assert_allclose(image[right][:, 3], 200 / 255, atol=1e-6)
 
 
 def test_a_mask_is_taken_through_the_lens_too(tmp_path: Path) -> None:

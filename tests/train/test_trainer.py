@@ -158,6 +158,13 @@ def test_the_hull_is_where_every_mask_agrees():
     assert points.shape == (400, 3) and away.max() < 1.0
     assert np.median(away) > 0.5
     assert hull_points(cameras, [np.zeros((60, 80), bool)] * 16, 400, 2) is None
+    # What is hidden from a few cameras carves nothing: the hull is that of the others.
+    hidden = [np.zeros((60, 80), bool)] * 4
+    counted = [*hidden, *[None] * 12]
+    some = hull_points(cameras, [*hidden, *masks[4:]], 400, 2, counted=counted)
+    assert some.tobytes() != points.tobytes()
+    assert np.linalg.norm(some - MIDDLE, axis=1).max() < 1.0
+    assert hull_points(cameras, [*hidden, *masks[4:]], 400, 2) is None
 
 
 @pytest.mark.parametrize(

@@ -13,6 +13,8 @@ from rift_cl.commands.evaluate.report import eval_page
 from rift_cl.commands.evaluate.settings import EvalSettings
 from rift_cl.commands.fit_photos.pictures import CapturePictures
 from rift_cl.commands.fit_photos.scores import (
+    Floats,
+    Mask,
     Score,
     ViewScore,
     error_record,
@@ -20,6 +22,7 @@ from rift_cl.commands.fit_photos.scores import (
     score_views,
 )
 from rift_cl.commands.fit_photos.view_split import open_seen, split_views
+from rift_cl.commands.inputs.opened_scene import in_display_light
 from rift_cl.commands.options import absolute_paths
 from rift_cl.commands.run_folder.run_folder import RunFolder
 from rift_cl.errors import InputError
@@ -59,8 +62,12 @@ class Evaluation:
             camera_at(view, self.downscale)
         self.device = settings.open_device()
         self.folder = RunFolder.of(settings, "eval")
+        # What is to be said of how pictures were scored, a sentence each.
+        self.notes: list[str] = []
         self.metrics: dict[str, Any] = {}
         self.scores: dict[str, list[ViewScore]] = {}
+        # What pictures of each group are drawn over, in the scene's light.
+        self.backgrounds: dict[str, Floats] = {}
 
     @property
     def decided(self) -> EvalSettings:
@@ -77,7 +84,7 @@ class Evaluation:
         more: dict[str, Score] = {}
         if self.settings.flip:
             flip_evaluator()
-            more["flip"] = flip
+            more["flip"] = _flip
         if self.settings.lpips is not None:
             more["lpips"] = _lpips(self.settings.lpips)
         return more
@@ -166,6 +173,8 @@ class Evaluation:
             "trained on": trained,
             "downscale": str(self.downscale),
             "eps2d": f"{self.scene.rendering.eps2d:g}",
+            "background": self._told
+            or "the common border of the scored photographs, or black without one",
             "scores": ", ".join(["PSNR", "SSIM", *(name.upper() for name in self.more)]),
             "device": self.device.name,
         }
@@ -178,37 +187,74 @@ class Evaluation:
         self.folder.make()
         for name, views in self.groups.items():
             test = self._pictures(views, training)
-            self.scores[name] = []
+            self.scores[name], self.backgrounds[name] = [], test.behind
+            self.notes.append(self._background_note(name, test))
             for score in score_views(renderer, splats, test, training, self.more):
                 self.scores[name].append(score)
                 yield Report(len(self.scores[name]), len(views), f"views of {name}")
         self.scores = {name: scores for name, scores in self.scores.items() if scores}
         if not self.scores:
             raise InputError(f"{self.scene.name}: every mask is black, there is nothing to score")
+        self.notes += self._left_out()
         self.metrics = {
             "splats": len(self.scene.splats),
             "eps2d": self.scene.rendering.eps2d,
             "downscale": self.downscale,
+            "background": {name: color.tolist() for name, color in self.backgrounds.items()},
             **score_record(self.scores),
             **error_record(self.scores),
         }
-        page = eval_page(self.scene.name, self.scores, self.metrics)
+        page = eval_page(self.scene.name, self.scores, self.metrics, self.notes)
         self.folder.finish(self.decided, self.metrics, page, self.device, asked=self.settings)
+
+    @property
+    def _told(self) -> str | None:
+        """Who says what is behind the splats; None where nobody does."""
+        if self.settings.background is not None:
+            return "as --background says"
+        return None if self.scene.told_background is None else "the background of the fit"
+
+    def _background_note(self, name: str, pictures: CapturePictures) -> str:
+        """A sentence about what the pictures of a group are drawn over."""
+        found = "black, since the photographs have no common border"
+        if pictures.border is not None:
+            found = "the common border of the photographs"
+        color = in_display_light(pictures.behind, self.scene.light)
+        shown = " ".join(f"{value:.3g}" for value in color)
+        return f"pictures of {name} are drawn over {shown}, {self._told or found}"
+
+    def _left_out(self) -> list[str]:
+        """A sentence about pictures that a score has no meaning of."""
+        scores = [score for group in self.scores.values() for score in group]
+        lacking = sum("fit_lpips" not in score.values for score in scores)
+        if "lpips" not in self.more or not lacking:
+            return []
+        return [
+            f"LPIPS is left out for {lacking} of {len(scores)} photographs, whose pixels do not "
+            "all count (a mask, or a lens): it has no map that could be averaged over the others"
+        ]
 
     def _pictures(
         self, views: tuple[View, ...], like: CapturePictures | None = None
     ) -> CapturePictures:
-        light = self.scene.light
-        pictures = CapturePictures(
-            self.device, views, downscale=self.downscale, light=light, like=like
+        return CapturePictures(
+            self.device,
+            views,
+            downscale=self.downscale,
+            light=self.scene.light,
+            like=like,
+            background=self.scene.told_background,
         )
-        if self.settings.background is not None:
-            pictures.behind = self.scene.background
-        return pictures
+
+
+def _flip(image: Floats, truth: Floats, counted: Mask | None) -> float:
+    return flip(image, truth, mask=counted)
 
 
 def _lpips(weights: Path) -> Score:
-    """LPIPS with weights from a file.
+    """LPIPS with weights from a file, of pictures all of whose pixels count.
+
+    Its features look at so much of a picture that none of them is of the pixels that count alone.
 
     Raises:
         InputError: torch is missing, or the weights cannot be read.
@@ -219,4 +265,5 @@ def _lpips(weights: Path) -> Score:
         )
     from rift_cl.interop.lpips import Lpips
 
-    return Lpips(weights)
+    lpips = Lpips(weights)
+    return lambda image, truth, counted: lpips(image, truth) if counted is None else None

@@ -16,15 +16,20 @@ _TRAINED = ("degrees away", "nearest PSNR", "blend PSNR")
 
 
 def eval_page(
-    name: str, groups: Mapping[str, Sequence[ViewScore]], metrics: Mapping[str, Any]
+    name: str,
+    groups: Mapping[str, Sequence[ViewScore]],
+    metrics: Mapping[str, Any],
+    notes: Sequence[str],
 ) -> Page:
-    """The report of a finished evaluation."""
+    """The report of a finished evaluation, with sentences about how it was scored."""
     page = Page(f"Scores of {name}", f"{metrics['splats']} splats, eps2d {metrics['eps2d']:g}")
     for group, scores in groups.items():
         page.section(f"Pictures: {group}")
         show_views(page, scores, "scene")
     page.section("Scores")
     page.table(*score_table(metrics), caption=SCORING)
+    for note in notes:
+        page.paragraph(note)
     for group, scores in groups.items():
         trained = any("nearest_psnr" in score.values for score in scores)
         kinds = [kind for kind in SCORES if any(f"fit_{kind}" in s.values for s in scores)]

@@ -22,6 +22,9 @@ class EvalInput(SceneInput):
     captures: Annotated[tuple[Path, ...], Positional, arg(help_behavior_hint="")] = ()
     """Captures to score: each a transforms.json, a folder with one, or a COLMAP model. Default: the
     photographs that the fit held out."""
+    background: Auto[tuple[float, float, float]] = None
+    """Background colour: red, green and blue in display light, 0 to 1. Default: that of the fit;
+    for a file the colour that all borders of the photographs have, or black without one."""
     train: Auto[Path] = None
     """Capture that the scene was trained on, for the baselines (nearest training photographs) and
     the angles to them. Default: the training photographs of the fit."""
@@ -37,7 +40,8 @@ class EvalInput(SceneInput):
     install flip-evaluator)."""
     lpips: Auto[Path] = None
     """Also score LPIPS (0 is equal), with the network's weights from this file: torch.save of the
-    state_dict() of lpips.LPIPS, net 'alex' or 'vgg'. Needs torch. Default: no LPIPS."""
+    state_dict() of lpips.LPIPS, net 'alex' or 'vgg'. Needs torch. Left out for photographs that a
+    mask or a lens leaves only a part of. Default: no LPIPS."""
 
 
 @dataclass(frozen=True, kw_only=True)

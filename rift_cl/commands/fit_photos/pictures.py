@@ -5,8 +5,8 @@ whenever they do not fit the budget, the next step's in another thread while a s
 step sees is the same either way. Those that have alpha of their own show what was cut out: they are
 laid over a background that is drawn by chance for each step, so that transparent places must become
 transparent. Alpha that is the same everywhere, as many programs write it, cuts out nothing. Where a
-mask is black, or the photograph did not reach once its lens was undone, nothing is known: such
-pixels do not count.
+mask is black, or the photograph did not reach once its lens was undone, nothing is known, whatever
+alpha says: such pixels do not count.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import replace
-from typing import Any, Literal
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,7 +23,7 @@ from rift_cl.cl.budget import free_host_memory
 from rift_cl.cl.device import Device
 from rift_cl.commands.pictures.evenly_spaced import evenly
 from rift_cl.geometry import Camera
-from rift_cl.io.captures.capture import View, camera_at, read_view
+from rift_cl.io.captures.capture import View, camera_at, read_known_view
 from rift_cl.io.images.display_light import to_display
 from rift_cl.io.images.picture_header import read_picture_header
 
@@ -45,6 +45,23 @@ Kept = NDArray[Any]
 Light = Literal["display", "linear"]
 
 
+class _Photograph(NamedTuple):
+    """A photograph in display or linear light, as numbers or as the codes that are kept.
+
+    Args:
+        image: (height, width, 3 or 4), alpha straight.
+        known: (height, width) the share of each pixel that is known; None where all is.
+    """
+
+    image: Kept
+    known: Kept | None
+
+    @property
+    def nbytes(self) -> int:
+        """Bytes of both arrays."""
+        return self.image.nbytes + (0 if self.known is None else self.known.nbytes)
+
+
 class CapturePictures:
     """Training views; see ``rift_cl.train.TrainingViews``.
 
@@ -54,7 +71,9 @@ class CapturePictures:
         downscale: whole factor by which they are made smaller.
         seed: of the random backgrounds.
         light: that pictures are in.
-        like: other photographs of the same scene, whose background these have; found if not given.
+        like: other photographs of the same scene, whose border and background these have.
+        background: what is behind the splats, in ``light``; that of ``like`` if not given, or the
+            colour that the photographs' borders have in common, or black without one.
     """
 
     def __init__(
@@ -66,29 +85,38 @@ class CapturePictures:
         seed: int = 0,
         light: Light = "display",
         like: CapturePictures | None = None,
+        background: Floats | None = None,
     ) -> None:
         self.device = device
         self.views = views
         self.cameras: Sequence[Camera] = [camera_at(view, downscale) for view in views]
         self.light: Light = light
         self._downscale, self._seed = downscale, seed
-        self._kept: dict[int, Kept] = {}
+        self._kept: dict[int, _Photograph] = {}
         self._own_alpha: dict[int, bool] = {}
         # A step asks for one picture several times.
-        self._last: tuple[int, Floats] | None = None
+        self._last: tuple[int, _Photograph] | None = None
         self._room = int(_SHARE * (free_host_memory() or 1 << 30))
         if device.traits.is_cpu or device.traits.unified:
             self._room = min(self._room, int(_OF_BUDGET * device.budget))
         self._view_at: Callable[[int], int] | None = None
-        self._coming: dict[int, Future[Kept]] = {}
+        self._coming: dict[int, Future[_Photograph]] = {}
         self._reader: ThreadPoolExecutor | None = None
-        found = self._common_border() if like is None else like.behind
-        self.behind: Floats = np.zeros(3, np.float32) if found is None else found
-        self.backed: bool = found is not None if like is None else like.backed
+        self.border: Floats | None = self._common_border() if like is None else like.border
+        if background is None:
+            background = self.border if like is None else like.behind
+        self.behind: Floats = np.zeros(3, np.float32) if background is None else background
         self._step = 0
 
     def image(self, number: int) -> Floats:
-        """(height, width, 3 or 4), alpha straight."""
+        """(height, width, 3), or 4 with the photograph's own alpha, straight."""
+        return self._photograph(number).image
+
+    def known(self, number: int) -> Floats | None:
+        """(height, width) the share of each pixel that is known; None where all is."""
+        return self._photograph(number).known
+
+    def _photograph(self, number: int) -> _Photograph:
         if self._last is None or self._last[0] != number:
             self._last = number, self._decoded(number)
         return self._last[1]
@@ -98,7 +126,7 @@ class CapturePictures:
         self._decoded(number)
         return number in self._kept
 
-    def _decoded(self, number: int) -> Floats:
+    def _decoded(self, number: int) -> _Photograph:
         kept = self._kept.get(number)
         if kept is None:
             coming = self._coming.pop(number, None)
@@ -106,15 +134,17 @@ class CapturePictures:
             if kept.nbytes <= self._room:
                 self._room -= kept.nbytes
                 self._kept[number] = kept
-        most = 1 if kept.dtype.kind == "f" else np.iinfo(kept.dtype).max
-        return np.asarray(kept, np.float32) / np.float32(most)
+        return _Photograph(_numbers(kept.image), _optional(_numbers, kept.known))
 
-    def _read(self, number: int) -> Kept:
+    def _read(self, number: int) -> _Photograph:
         """A photograph as it is kept; by any thread."""
-        image = _without_constant_alpha(
-            read_view(self.views[number], downscale=self._downscale, light=self.light)
+        image, known = read_known_view(
+            self.views[number], downscale=self._downscale, light=self.light
         )
-        return _codes_of(image) if self.light == "display" else image
+        image = _without_constant_alpha(image, known)
+        if self.light == "linear":
+            return _Photograph(image, known)
+        return _Photograph(_codes_of(image), _optional(_codes_of, known))
 
     def announce(self, view_at: Callable[[int], int]) -> None:
         """Say which photograph each step asks for, so that it is read while the one before works.
@@ -135,11 +165,14 @@ class CapturePictures:
 
     def over(self, number: int, background: Floats) -> Floats:
         """(height, width, 3) over a background, which also stands where nothing is known."""
-        image = self.image(number)
-        if image.shape[2] == 3:
+        image, known = self._photograph(number)
+        if image.shape[2] == 3 and known is None:
             return image
-        alpha = image[..., 3:]
-        return np.asarray(image[..., :3] * alpha + background * (1 - alpha), np.float32)
+        cover = image[..., 3:] if image.shape[2] == 4 else np.ones_like(image[..., :1])
+        if known is not None:
+            # Colours are those of what is known of a pixel, of however little.
+            cover = cover * (known > 0)[..., None]
+        return np.asarray(image[..., :3] * cover + background * (1 - cover), np.float32)
 
     def any_cut_out(self) -> bool:
         """Whether a photograph has alpha of its own."""
@@ -148,14 +181,8 @@ class CapturePictures:
     def _is_cut_out(self, number: int) -> bool:
         """Whether a photograph has alpha of its own, and this is not the same everywhere."""
         if number not in self._own_alpha:
-            view = self.views[number]
-            own = read_picture_header(view.image).alpha
-            if own and view.mask is None and view.lens is None:
-                own = self.image(number).shape[2] == 4
-            elif own:
-                bare = replace(view, mask=None, lens=None)
-                own = _without_constant_alpha(read_view(bare)).shape[2] == 4
-            self._own_alpha[number] = own
+            alpha = read_picture_header(self.views[number].image).alpha
+            self._own_alpha[number] = alpha and self.image(number).shape[2] == 4
         return self._own_alpha[number]
 
     def _fills(self, number: int) -> bool:
@@ -163,15 +190,10 @@ class CapturePictures:
         opaque = read_picture_header(self.views[number].image).alpha
         return opaque and any(self._is_cut_out(other) for other in evenly(len(self.views), 8))
 
-    def _shares(self, number: int) -> Floats | None:
-        """(height, width) how much of each pixel is known; None where all is."""
-        image = self.image(number)
-        return None if image.shape[2] == 3 or self._is_cut_out(number) else image[..., 3]
-
     def counted(self, number: int) -> NDArray[np.bool_] | None:
         """(height, width) the pixels that count; None where all do."""
-        shares = self._shares(number)
-        return None if shares is None else np.asarray(shares > _KNOWN)
+        known = self.known(number)
+        return None if known is None else np.asarray(known > _KNOWN)
 
     def shown(self, image: Floats) -> Floats:
         """An image, drawn or photographed, in display light from 0 to 1: as people score it."""
@@ -197,11 +219,11 @@ class CapturePictures:
 
     def weights(self, number: int) -> Any:
         """(height, width) device array, how much each pixel counts; None where all do."""
-        shares = self._shares(number)
-        return None if shares is None else self.device.send(np.ascontiguousarray(shares))
+        known = self.known(number)
+        return None if known is None else self.device.send(known)
 
     def _behind(self, number: int) -> Floats:
-        if self.image(number).shape[2] == 3 or not self._is_cut_out(number):
+        if self.image(number).shape[2] == 3:
             return self.behind
         random = np.random.default_rng((self._seed, self._step, 0xBAC))
         return random.uniform(0, 1, 3).astype(np.float32)
@@ -209,13 +231,14 @@ class CapturePictures:
     def foreground(self, number: int) -> NDArray[np.bool_] | None:
         """(height, width) foreground mask; None if it is not known."""
         image, counted = self.image(number), self.counted(number)
-        if image.shape[2] == 4 and counted is None:
-            return np.asarray(image[..., 3] > _FOREGROUND)
-        if counted is None and self._fills(number):
-            return np.ones(image.shape[:2], bool)
-        if not self.backed:
+        if image.shape[2] == 4:
+            front = image[..., 3] > _FOREGROUND
+        elif self._fills(number):
+            front = np.ones(image.shape[:2], bool)
+        elif self.border is not None:
+            front = np.abs(image - self.border).max(axis=2) > _FOREGROUND
+        else:
             return None
-        front = np.abs(image[..., :3] - self.behind).max(axis=2) > _FOREGROUND
         return np.asarray(front if counted is None else front & counted)
 
     def nothing_in_front(self) -> bool:
@@ -224,28 +247,74 @@ class CapturePictures:
         return all(front is not None and not front.any() for front in fronts)
 
     def _common_border(self) -> Floats | None:
-        """The colour that all borders of a few pictures have; None if they have none."""
+        """The colour that all borders of a few pictures have; None if they have none.
+
+        Cut-out pictures have none: where they are transparent, their colours mean nothing.
+        """
         few = evenly(len(self.views), 8)
-        edges = []
-        for number in few:
-            image, shares = self.image(number)[..., :3], self._shares(number)
-            known = np.ones(image.shape[:2], bool) if shares is None else shares > _KNOWN
-            for edge in ((0, slice(None)), (-1, slice(None)), (slice(None), 0), (slice(None), -1)):
-                edges.append(image[edge][known[edge]])
-        border = np.concatenate(edges)
+        if any(self._is_cut_out(number) for number in few):
+            return None
+        border = np.concatenate([self._border(number) for number in few])
         if not len(border):
             return None
         middle = np.median(border, axis=0)
         same = np.abs(border - middle).max(axis=1) <= _CODES / 255
         return np.asarray(middle, np.float32) if same.mean() >= _UNIFORM else None
 
+    def _border(self, number: int) -> Floats:
+        """(samples, 3) what counts along the border of what a photograph reaches."""
+        image, counted = self.image(number), self.counted(number)
+        places = _outline(self._reached(number))
+        colors = image[places]
+        return colors if counted is None else colors[counted[places]]
 
-def _without_constant_alpha(image: Floats) -> Floats:
-    """The colours alone where alpha is one number above 0 everywhere, and so tells nothing."""
+    def _reached(self, number: int) -> NDArray[np.bool_]:
+        """(height, width) where a photograph reaches once its lens is undone, masked or not.
+
+        A mask's own edge may run along the object: it is no border of the photograph.
+        """
+        view, counted = self.views[number], self.counted(number)
+        if view.lens is not None and view.mask is not None:
+            bare = replace(view, mask=None)
+            _, known = read_known_view(bare, downscale=self._downscale, light=self.light)
+            return np.asarray(known) > _KNOWN
+        if view.lens is None or counted is None:
+            return np.ones(self.image(number).shape[:2], bool)
+        return counted
+
+
+def _outline(reached: NDArray[np.bool_]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """Rows and columns of the first and the last pixel that is reached of each row and column."""
+    rows, columns = (np.flatnonzero(reached.any(axis=axis)) for axis in (1, 0))
+    last_row, last_column = (side - 1 for side in reached.shape)
+    sides = (
+        (rows, reached.argmax(axis=1)[rows]),
+        (rows, last_column - reached[:, ::-1].argmax(axis=1)[rows]),
+        (reached.argmax(axis=0)[columns], columns),
+        (last_row - reached[::-1].argmax(axis=0)[columns], columns),
+    )
+    along = [np.concatenate(places) for places in zip(*sides, strict=True)]
+    return along[0], along[1]
+
+
+def _without_constant_alpha(image: Floats, known: Floats | None) -> Floats:
+    """The colours alone where what is known has one alpha above 0, which so tells nothing."""
     if image.shape[2] == 3:
         return image
-    alpha = image[..., 3]
-    return image[..., :3] if 0 < alpha.min() == alpha.max() else image
+    alpha = image[..., 3] if known is None else image[..., 3][known > 0]
+    # One number is no longer the same to the last bit once it was averaged by a mask.
+    tells = alpha.size > 0 and not 0 < alpha.min() >= alpha.max() - _EXACT / 255
+    return image if tells else image[..., :3]
+
+
+def _optional(function: Callable[[Kept], Kept], array: Kept | None) -> Kept | None:
+    return None if array is None else function(array)
+
+
+def _numbers(kept: Kept) -> Floats:
+    """What codes stand for."""
+    most = 1 if kept.dtype.kind == "f" else np.iinfo(kept.dtype).max
+    return np.asarray(kept, np.float32) / np.float32(most)
 
 
 def _codes_of(image: Floats) -> Kept:

@@ -181,6 +181,8 @@ def show_views(page: Page, scores: Sequence[ViewScore], what: str) -> None:
     for place in evenly(len(order), _SHOWN):
         score = order[place]
         error = np.clip(np.abs(score.image - score.truth) * ERROR_GAIN, 0, 1)
+        if score.counted is not None:
+            error[~score.counted] = 0
         pair = (jpeg(score.truth), jpeg(score.image))
         cells += [Compared(*pair, names=("photograph", what)), jpeg(error)]
         titles += [f"{score.name}, {score.values['fit_psnr']:.1f} dB", "error"]

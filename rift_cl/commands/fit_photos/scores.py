@@ -30,9 +30,11 @@ from rift_cl.splat.splats import Splats
 from rift_cl.train.start.points import focus_of
 
 Floats = NDArray[np.float32]
-Masks = tuple[NDArray[np.bool_] | None, NDArray[np.bool_] | None]
-# A score of a picture (height, width, 3) in display light beside the truth.
-Score = Callable[[Floats, Floats], float]
+Mask = NDArray[np.bool_]
+Masks = tuple[Mask | None, Mask | None]
+# A score of a picture (height, width, 3) in display light beside the truth, over the pixels
+# (height, width) that count, None for all; None where it has no meaning of a part of a picture.
+Score = Callable[[Floats, Floats, Mask | None], float | None]
 
 
 @dataclass(frozen=True)
@@ -48,6 +50,7 @@ class ViewScore:
         elevation: of the camera above the focus, in degrees; NaN where it is not known.
         distance: to the nearest training camera over that to the focus; NaN where it is not known.
         places: where the picture errs; None of X-rays.
+        counted: (height, width) the pixels that count; None for all.
     """
 
     name: str
@@ -58,6 +61,7 @@ class ViewScore:
     elevation: float = math.nan
     distance: float = math.nan
     places: ErrorPlaces | None = None
+    counted: Mask | None = None
 
 
 def score_views(
@@ -76,13 +80,15 @@ def score_views(
     cameras = (training or test).cameras
     behind, focus, up = test.behind, focus_of(cameras), common_up(cameras)
     for number, camera in enumerate(test.cameras):
-        masks = test.counted(number), test.foreground(number)
-        if masks[0] is not None and not masks[0].any():
+        counted, foreground = test.counted(number), test.foreground(number)
+        if counted is not None and not counted.any():
             warnings.warn(
                 f"{test.views[number].name}: its mask is black, so that it is not scored",
                 stacklevel=2,
             )
             continue
+        # A lens may well leave nothing out.
+        masks = None if counted is None or counted.all() else counted, foreground
         drawn = renderer.picture(splats, camera, background=renderer.device.array(behind))
         image = test.shown(drawn.image)
         truth = test.shown(test.over(number, behind))
@@ -95,7 +101,7 @@ def score_views(
         elevation = math.nan if up is None else angles_of(camera, focus, up)[1]
         places = ErrorPlaces.of(image, truth, *masks)
         name = test.views[number].name
-        yield ViewScore(name, angle, values, truth, image, elevation, distance, places)
+        yield ViewScore(name, angle, values, truth, image, elevation, distance, places, masks[0])
 
 
 def scores_of(
@@ -105,7 +111,10 @@ def scores_of(
     name: str,
     more: Mapping[str, Score] | None = None,
 ) -> dict[str, float]:
-    """PSNR and SSIM of the whole picture and of the foreground, where there is one.
+    """PSNR and SSIM of all that counts, and PSNR of the foreground, where there is one.
+
+    Maps of SSIM and FLIP are averaged over the pixels that count. Their windows find the truth in
+    the others, so that nothing that is drawn there changes a score.
 
     Args:
         image: (height, width, C) what is scored.
@@ -113,7 +122,7 @@ def scores_of(
         masks: the pixels that count at all, and the foreground; None where it is all of them, or
             where nobody can tell.
         name: goes before the scores' names.
-        more: further scores of the whole picture.
+        more: further scores of all that counts.
     """
     counted, foreground = masks
     if counted is not None:
@@ -121,16 +130,20 @@ def scores_of(
     channels = range(truth.shape[2])
     values = {
         f"{name}_psnr": psnr(image, truth, mask=_of_samples(counted, truth)),
-        f"{name}_ssim": float(np.mean([ssim(image[..., c], truth[..., c]) for c in channels])),
+        f"{name}_ssim": float(
+            np.mean([ssim(image[..., c], truth[..., c], mask=counted) for c in channels])
+        ),
     }
     if foreground is not None and foreground.any() and not foreground.all():
         values[f"{name}_psnr_foreground"] = psnr(image, truth, mask=_of_samples(foreground, truth))
     for kind, score in (more or {}).items():
-        values[f"{name}_{kind}"] = score(image, truth)
+        value = score(image, truth, counted)
+        if value is not None:
+            values[f"{name}_{kind}"] = value
     return values
 
 
-def _of_samples(mask: NDArray[np.bool_] | None, truth: Floats) -> NDArray[np.bool_] | None:
+def _of_samples(mask: Mask | None, truth: Floats) -> Mask | None:
     return None if mask is None else np.repeat(mask[..., None], truth.shape[2], axis=2)
 
 
@@ -162,7 +175,8 @@ def brightness_of(scores: Sequence[ViewScore]) -> Brightness:
     """
     factors, before, after = [], 0.0, 0.0
     for score in scores:
-        image, truth = score.image.astype(np.float64), score.truth.astype(np.float64)
+        counts = slice(None) if score.counted is None else score.counted
+        image, truth = (a[counts].astype(np.float64) for a in (score.image, score.truth))
         square, product = float((image**2).sum()), float((image * truth).sum())
         if square > 0 and product > 0:
             factors.append(product / square)

@@ -67,7 +67,8 @@ def _guessed(pictures: CapturePictures, count: int, seed: int) -> Any:
     masks = [front for front in fronts if front is not None]
     if len(masks) == len(few):
         cameras = [pictures.cameras[number] for number in few]
-        points = hull_points(cameras, masks, count, seed)
+        counted = [pictures.counted(number) for number in few]
+        points = hull_points(cameras, masks, count, seed, counted=counted)
         if points is not None:
             return points
     first = max(1, int(count * _FIRST_SHARE))

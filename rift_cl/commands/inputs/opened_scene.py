@@ -68,7 +68,14 @@ class OpenedScene:
         self.light: Light = self._light()
         if settings.environment is not None:
             self.splats = self._relit(settings.environment)
-        self.background: NDArray[np.float32] = self._background(settings)
+        # What is behind the splats, in their light; None where neither user nor fit says so.
+        self.told_background: NDArray[np.float32] | None = self._background(settings)
+
+    @property
+    def background(self) -> NDArray[np.float32]:
+        """What is behind the splats, in their light; black where nobody says so."""
+        told = self.told_background
+        return np.zeros(3, np.float32) if told is None else told
 
     @property
     def fit(self) -> Path | None:
@@ -146,17 +153,19 @@ class OpenedScene:
             return "display"
         raise FileFormatError(f"{self._settings.where}: 'light' is no light: {light!r}")
 
-    def _background(self, settings: SceneInput) -> NDArray[np.float32]:
-        """What is behind the splats, in their light."""
+    def _background(self, settings: SceneInput) -> NDArray[np.float32] | None:
+        """What the user or the fit says is behind the splats, in their light."""
         if settings.background is not None:
             color = np.array(check_color("--background", settings.background), np.float32)
             if self.light == "linear":
                 to_linear(color)
             return color
         if self.folder is None or not (self.folder / _METRICS).is_file():
-            return np.zeros(3, np.float32)
+            return None
         metrics = read_json_object(self.folder / _METRICS)
-        found = metrics.values.get("background", [0, 0, 0])
+        found = metrics.values.get("background")
+        if found is None:
+            return None
         if not (isinstance(found, list) and len(found) == 3):
             raise FileFormatError(f"{metrics.where}: 'background' is no red, green and blue")
         return np.array(check_color(f"{metrics.where}: 'background'", tuple(found)), np.float32)

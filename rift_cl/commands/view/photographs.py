@@ -51,7 +51,9 @@ def photographs_in_work(pictures: CapturePictures) -> list[Photograph]:
     """The photographs of a fit that runs, as it sees them."""
 
     def read(number: int) -> Floats:
-        return pictures.shown(pictures.over(number, pictures.behind))
+        picture, known = pictures.over(number, pictures.behind), pictures.known(number)
+        shown = pictures.shown(picture)
+        return shown if known is None else np.dstack([shown, known])
 
     return [
         Photograph(view.name, camera, lambda number=number: read(number))  # type: ignore[misc]

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from rift_cl.errors import InputError
 from rift_cl.io.boundary import reading
-from rift_cl.io.captures.capture_notes import color_notes
+from rift_cl.io.captures.capture_notes import color_notes, part_notes
 from rift_cl.io.captures.colmap_model import MODEL_FOLDERS, find_model, open_model
 from rift_cl.io.captures.photograph_folder import (
     other_files,
@@ -19,7 +19,7 @@ from rift_cl.io.captures.photograph_folder import (
 from rift_cl.io.captures.transforms_json import open_transforms
 from rift_cl.io.captures.video import is_video
 from rift_cl.io.captures.view import Capture, View, as_pinholes, camera_at
-from rift_cl.io.captures.view_image import read_view
+from rift_cl.io.captures.view_image import read_known_view, read_view
 
 __all__ = [
     "Capture",
@@ -30,6 +30,7 @@ __all__ = [
     "holds_bare_photographs",
     "holds_capture",
     "open_capture",
+    "read_known_view",
     "read_view",
 ]
 
@@ -71,7 +72,10 @@ def open_capture(
         path = _absolute(path)
         file = _transforms(path)
         if file is not None and images is None:
-            return _told(open_transforms(file, photographs=photographs), photographs)
+            capture = open_transforms(file, photographs=photographs)
+            if file != path and file.name == _TRANSFORMS[1]:
+                capture = replace(capture, notes=(*capture.notes, *part_notes(file)))
+            return _told(capture, photographs)
         model = find_model(path)
     if model is not None:
         folder = None if images is None else photographs_in(Path(images))

@@ -1,11 +1,12 @@
 """What is said of the photographs of a capture once its views are known, a sentence each.
 
 None of it makes a capture unusable, and all of it may be meant: masks that no photograph has,
-photographs without a pose, colours that are not sRGB's.
+photographs without a pose, colours that are not sRGB's, files that are scored if they are named.
 """
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Sequence
 from contextlib import suppress
 from pathlib import Path
@@ -16,8 +17,27 @@ from rift_cl.io.captures.photograph_folder import photograph_names
 from rift_cl.io.captures.view import View
 from rift_cl.io.images.picture_header import PictureHeader, read_picture_header
 
+# What lies beside the training file of NeRF's synthetic scenes.
+_SCORED = ("transforms_val.json", "transforms_test.json")
 # Photographs whose headers are read for their colours.
 _LOOKED_AT = 8
+
+
+def part_notes(file: Path) -> list[str]:
+    """Which files beside a ``transforms_train.json`` have photographs to score, and how.
+
+    Args:
+        file: what was taken of a folder.
+    """
+    others = [path for name in _SCORED if (path := file.parent / name).is_file()]
+    if not others:
+        return []
+    names = " and ".join(path.name for path in others)
+    given = " ".join(shlex.quote(str(path)) for path in others)
+    return [
+        f"{file.name} is taken of {file.parent}, and {names} beside it is left alone: 'rift fit' "
+        f"scores its photographs if it is told --test {given} --hold-out 0"
+    ]
 
 
 def pose_notes(images: CaptureFolder, views: Sequence[View]) -> list[str]:

@@ -1,7 +1,8 @@
 """The pixels of a view: as a pinhole would have seen them, at the size that is asked for.
 
 Photographs are averaged and resampled in linear light with alpha multiplied in, because that is
-what light and coverage do; what comes out has straight alpha.
+what light and coverage do; what comes out has straight alpha. What a mask hides is no part of such
+a mean: alpha says where a scene is empty, a mask where nobody knows.
 """
 
 from __future__ import annotations
@@ -62,7 +63,8 @@ def read_view(
 
     Returns:
         float32 (y, x, 3), or (y, x, 4) with straight alpha where the photograph has alpha, a
-        mask or a lens. Alpha is 0 where a mask is black and where the photograph does not reach.
+        mask or a lens. Alpha is 0 where a mask is black and where the photograph does not reach;
+        ``read_known_view`` tells these from what is transparent.
 
     Raises:
         InputError: an image is missing, or an argument makes no sense.
@@ -71,30 +73,66 @@ def read_view(
         NonFiniteError: it holds NaN or infinity.
         ResourceLimitError: it is larger than the budget; nothing was allocated.
     """
+    image, known = read_known_view(view, downscale=downscale, light=light, budget=budget)
+    if known is None:
+        return image
+    image = _with_alpha(image)
+    image[..., 3] *= known
+    return image
+
+
+def read_known_view(
+    view: View, *, downscale: int = 1, light: LightKind = "display", budget: int | None = None
+) -> tuple[Image, Image | None]:
+    """Read a photograph as ``read_view`` does, and beside it how much of each pixel is known.
+
+    What is transparent is known to be empty. Of what a mask hides, or what the photograph does
+    not reach once its lens is undone, nothing is known.
+
+    Args:
+        view: one of the views of a capture.
+        downscale: whole factor to make the image smaller by; areas are averaged.
+        light: "display" or "linear"; see ``read_view``.
+        budget: bytes that the reading may take; 60 % of the free memory when not given.
+
+    Returns:
+        float32 (y, x, 3), or (y, x, 4) with straight alpha where the photograph has alpha of its
+        own: the means of what is known of each pixel. And float32 (y, x), the share of each pixel
+        that is known, from 0 to 1; None for a photograph without mask and lens, all of which is.
+
+    Raises:
+        RiftError: as ``read_view`` does.
+    """
     if light not in ("display", "linear"):
         raise InputError(f"read_view: light is {light!r}, wanted 'display' or 'linear'")
     camera_at(view, downscale)
     header = _checked_header(view, budget)
     turn = header.orientation if view.upright or header.size != view.camera.size else 1
     image = upright(read_photograph(view.image, header, budget), turn)
+    known = None
     if view.mask is not None:
-        mask = _coverage(view.mask, budget)
-        image = _with_alpha(image)
-        image[..., 3] *= upright(mask, turn) if mask.shape == header.size else mask
+        known = _coverage(view.mask, budget)
+        known = upright(known, turn) if known.shape == header.size else known
     if downscale == 1 and view.lens is None:
-        return _converted(image, linear=header.linear, wanted=light)
+        return _converted(image, linear=header.linear, wanted=light), known
     image = _converted(image, linear=header.linear, wanted="linear")
-    if view.lens is not None:
-        image = _with_alpha(image)
+    if view.lens is not None and known is None:
+        known = np.ones(image.shape[:2], np.float32)
     with_alpha = image.shape[2] == 4
     if with_alpha:
         image[..., :3] *= image[..., 3:]
+    if known is not None:
+        image *= known[..., np.newaxis]
+        image = np.dstack([image, known])
     if view.lens is not None:
         image = undistorted(image, view.lens)
     image = shrunk(image, int(downscale))
+    if known is not None:
+        image, known = _split(image)
+        _divide(image, known)
     if with_alpha:
-        _divide_by_alpha(image)
-    return _converted(image, linear=True, wanted=light)
+        _divide(image[..., :3], image[..., 3])
+    return _converted(image, linear=True, wanted=light), known
 
 
 def _checked_header(view: View, budget: int | None) -> PictureHeader:
@@ -214,9 +252,15 @@ def _with_alpha(image: Image) -> Image:
     return full
 
 
-def _divide_by_alpha(image: Image) -> None:
-    alpha = image[..., 3:]
-    np.divide(image[..., :3], alpha, out=image[..., :3], where=alpha > 0)
+def _split(image: Image) -> tuple[Image, Image]:
+    """All channels but the last, and the last."""
+    return np.ascontiguousarray(image[..., :-1]), np.ascontiguousarray(image[..., -1])
+
+
+def _divide(image: Image, share: Image) -> None:
+    """Divide channels (y, x, channel) by what was multiplied into them, where that is not 0."""
+    divisor = share[..., np.newaxis]
+    np.divide(image, divisor, out=image, where=divisor > 0)
 
 
 def _converted(image: Image, *, linear: bool, wanted: LightKind) -> Image:

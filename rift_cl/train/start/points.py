@@ -201,7 +201,12 @@ def _on_rays(
 
 
 def hull_points(
-    cameras: Sequence[Camera], masks: Sequence[NDArray[np.bool_]], count: int, seed: int
+    cameras: Sequence[Camera],
+    masks: Sequence[NDArray[np.bool_]],
+    count: int,
+    seed: int,
+    *,
+    counted: Sequence[NDArray[np.bool_] | None] | None = None,
 ) -> Floats | None:
     """Points in the visual hull: what all cameras see in front of the background, (N, 3).
 
@@ -212,16 +217,20 @@ def hull_points(
         masks: (height, width) the foreground of each.
         count: how many points.
         seed: random seed.
+        counted: (height, width) the pixels of each that are known; None for all. A point that
+            falls on another is not seen by that camera, and is neither carved nor kept by it.
 
     Returns:
         The points, or None where hardly any point is in front of the background everywhere.
     """
     random = np.random.default_rng((seed, 0x40CC))
+    seen_by = [None] * len(cameras) if counted is None else counted
+    views = list(zip(cameras, masks, seen_by, strict=True))
     middle = focus_of(cameras)
     centers = np.array([camera.center for camera in cameras])
     reach = float(np.median(np.linalg.norm(centers - middle, axis=1))) or 1.0
     coarse = middle + random.uniform(-reach, reach, (_COARSE, 3))
-    coarse = coarse[_in_hull(cameras, masks, coarse)]
+    coarse = coarse[_in_hull(views, coarse)]
     if len(coarse) < _FEWEST:
         return None
     margin = 0.1 * (coarse.max(axis=0) - coarse.min(axis=0))
@@ -229,10 +238,10 @@ def hull_points(
     shell, core = [np.empty((0, 3))], [np.empty((0, 3))]
     for _ in range(_TRIES):
         points = random.uniform(low, high, (count, 3))
-        points = points[_in_hull(cameras, masks, points)]
+        points = points[_in_hull(views, points)]
         away = random.normal(size=points.shape)
         away *= _DEPTH * reach / np.linalg.norm(away, axis=1, keepdims=True)
-        near = ~_in_hull(cameras, masks, points + away)
+        near = ~_in_hull(views, points + away)
         shell.append(points[near])
         core.append(points[~near])
         found, rest = sum(map(len, shell)), sum(map(len, core))
@@ -243,14 +252,16 @@ def hull_points(
 
 
 def _in_hull(
-    cameras: Sequence[Camera], masks: Sequence[NDArray[np.bool_]], points: Floats
+    views: Sequence[tuple[Camera, NDArray[np.bool_], NDArray[np.bool_] | None]], points: Floats
 ) -> NDArray[np.bool_]:
     seen, front = np.zeros(len(points)), np.zeros(len(points))
-    for camera, mask in zip(cameras, masks, strict=True):
+    for camera, mask, counted in views:
         rows, columns, inside = pixels_of(camera, points)
+        if counted is not None:
+            inside = inside & counted[rows, columns]
         seen += inside
         front += inside & mask[rows, columns]
-    return np.asarray((seen >= _SHARE_OF_VIEWS * len(cameras)) & (front >= _HULL * seen))
+    return np.asarray((seen >= _SHARE_OF_VIEWS * len(views)) & (front >= _HULL * seen))
 
 
 def pixels_of(
