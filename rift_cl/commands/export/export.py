@@ -53,9 +53,7 @@ class Export:
         self.format = self._format(format_name(settings, "html"))
         self.path = output_path(settings, self.format.suffix)
         self._bounds = settings.bounds(self.scene)
-        self.plain, self.notes = plain_scene(
-            self.scene.splats, self.scene.light, self._bounds.cameras
-        )
+        self.plain, self.notes = plain_scene(self.scene.splats, self._bounds.cameras)
         if self.plain.degree > DEGREE:
             kept = np.ascontiguousarray(self.plain.sh[:, : (DEGREE + 1) ** 2])
             self.plain = dataclasses.replace(self.plain, sh=kept)
