@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gzip
 from pathlib import Path
 
 import numpy as np
@@ -66,6 +67,25 @@ def test_what_is_lost_is_said_before_and_nothing_is_written_on_a_dry_run(here, a
     assert [entry.name for entry in here.iterdir()] == ["ball.ply"]
     assert export("ball.ply", "--to", "spz") == 0
     assert "rift: modes become" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("name", ["html", *FORMATS])
+def test_antialiased_splats_are_told_of_whatever_the_format(name, here, arrays, capsys):
+    more = ("--dry-run", "--eps2d", 0.3)
+    for antialiased in (False, True):
+        SplatScene(**arrays, antialiased=antialiased).save(here / "ball.ply")
+        assert export("ball.ply", "--to", name, "--out", "new", *more) == 0
+        said = " ".join(capsys.readouterr().out.split())
+        assert ("Mip-Splatting" in said) == antialiased
+        assert ("no field of the format says so" in said) == (antialiased and name != "spz")
+
+
+def test_spz_says_whether_splats_are_antialiased(here, arrays, capsys):
+    for antialiased in (False, True):
+        SplatScene(**arrays, antialiased=antialiased).save(here / "ball.ply")
+        assert export("ball.ply", "--to", "spz", "--overwrite", "--eps2d", 0.3) == 0
+        assert gzip.decompress((here / "ball.spz").read_bytes())[14] == antialiased
+        assert ("the file says so" in " ".join(capsys.readouterr().err.split())) == antialiased
 
 
 def test_densities_of_xrays_are_no_splats_of_a_viewer(here, arrays, capsys):

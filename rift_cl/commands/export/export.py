@@ -74,11 +74,29 @@ class Export:
                 "changes with the direction is lost (other formats keep it; a fit with "
                 "--sh-degree 0 has nothing to lose by it)"
             )
-        if self.scene.rendering.eps2d != _VIEWERS:
-            self.notes.append(
+        self.notes += self._blur_notes()
+
+    def _blur_notes(self) -> list[str]:
+        """What viewers make of splats on the screen that the fit did not."""
+        eps2d, notes = self.scene.rendering.eps2d, list[str]()
+        if eps2d != _VIEWERS:
+            notes.append(
                 f"viewers blur by {_VIEWERS:g} square pixels, the scene was fitted with "
-                f"{self.scene.rendering.eps2d:g}: pictures smaller than the photographs look softer"
+                f"{eps2d:g}: pictures smaller than the photographs look softer"
             )
+        if self.scene.rendering.antialiased:
+            told = (
+                "the file says so, but viewers that do not heed it"
+                if self.format.antialiased
+                else "no field of the format says so, and viewers"
+            )
+            notes.append(
+                "the scene was fitted antialiased, with splats dimmed as blur widens them "
+                f"(Mip-Splatting): {told} draw small splats too opaque, unless antialiasing is "
+                "switched on in them (fit without --rendering.antialiased what is to be shown "
+                "elsewhere)"
+            )
+        return notes
 
     def _format(self, name: str) -> SplatFormat:
         if name == "html":

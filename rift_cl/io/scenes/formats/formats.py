@@ -26,12 +26,14 @@ class SplatFormat:
         encode: from a scene of plain splats to the bytes of a file.
         upright: whether its files have y up; the others keep the axes of the scene.
         rounds: what of a splat is not kept to the bit.
+        antialiased: whether its files can say that splats are antialiased.
     """
 
     suffix: str
     encode: Callable[[SplatScene], bytes]
     upright: bool
     rounds: str
+    antialiased: bool = False
 
 
 def _plain_ply(scene: SplatScene) -> bytes:
@@ -44,7 +46,7 @@ FORMATS = {
     "compressed-ply": SplatFormat(
         ".compressed.ply", encode_compressed_ply, False, "everything, within chunks of 256 splats"
     ),
-    "spz": SplatFormat(".spz", encode_spz, True, "everything, harmonics most"),
+    "spz": SplatFormat(".spz", encode_spz, True, "everything, harmonics most", antialiased=True),
     "sog": SplatFormat(".sog", encode_sog, False, "everything, to palettes made for the scene"),
     "glb": SplatFormat(".glb", encode_glb, True, "nothing"),
 }

@@ -32,6 +32,8 @@ from rift_cl.io.scenes.splat_activations import opacities_of
 from rift_cl.io.scenes.splat_scene import SplatScene
 
 _MAGIC, _VERSION = 0x5053474E, 3
+# What the flags say: splats are to be dimmed as they are widened (Mip-Splatting).
+_ANTIALIASED = 1
 # A gzip member without a name, a date or a system.
 _GZIP = b"\x1f\x8b\x08\x00\x00\x00\x00\x00\x02\xff"
 # Bits after the point of a place at most, and the largest number that 24 bits hold.
@@ -50,7 +52,8 @@ def encode_spz(scene: SplatScene) -> bytes:
     check_plain(scene, 3)
     scene = along_curve(scene)
     digits = fraction_bits(scene)
-    header = (_MAGIC, _VERSION, len(scene), scene.degree, digits, 0, 0)
+    flags = _ANTIALIASED if scene.antialiased else 0
+    header = (_MAGIC, _VERSION, len(scene), scene.degree, digits, flags, 0)
     parts = [
         struct.pack("<IIIBBBB", *header),
         _places(scene, digits),
