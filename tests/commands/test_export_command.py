@@ -80,6 +80,23 @@ def test_antialiased_splats_are_told_of_whatever_the_format(name, here, arrays, 
         assert ("no field of the format says so" in said) == (antialiased and name != "spz")
 
 
+def test_far_splats_of_spz_are_told_of_on_a_dry_run(here, capsys):
+    random = np.random.default_rng(1)
+    means = random.normal(size=(200, 3))
+    for farthest in (10, 1e6):
+        means[0] = [0, 0, farthest]
+        SplatScene(
+            means=means,
+            log_scales=np.full((200, 3), -3.0),
+            quats=np.tile([1.0, 0, 0, 0], (200, 1)),
+            logit_opacities=np.zeros(200),
+            sh=np.zeros((200, 1, 3)),
+        ).save(here / "ball.ply")
+        assert export("ball.ply", "--to", "spz", "--dry-run") == 0
+        said = " ".join(capsys.readouterr().out.split())
+        assert ("1 of 200 splats" in said) == (farthest == 1e6)
+
+
 def test_spz_says_whether_splats_are_antialiased(here, arrays, capsys):
     for antialiased in (False, True):
         SplatScene(**arrays, antialiased=antialiased).save(here / "ball.ply")

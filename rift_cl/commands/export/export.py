@@ -74,6 +74,8 @@ class Export:
                 "changes with the direction is lost (other formats keep it; a fit with "
                 "--sh-degree 0 has nothing to lose by it)"
             )
+        places = (self.plain.means @ self.turn.T).astype(np.float32)
+        self.notes += self.format.place_notes(places)
         self.notes += self._blur_notes()
 
     def _blur_notes(self) -> list[str]:

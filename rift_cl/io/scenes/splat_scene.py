@@ -13,7 +13,7 @@ import os
 from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -171,9 +171,9 @@ class SplatScene:
             mode, basis, drawing, arrays = _read(path, budget=budget)
         if basis.environment:
             check_finite(arrays["environment"], name=f"{path}: environment")
-        arrays = whole_splats(path, mode, arrays)
+        whole: dict[str, Any] = whole_splats(path, mode, arrays)
         kind: type[SplatScene] = XrayScene if mode == "xray" else SplatScene
-        return kind(**arrays, activation=basis.activation, angular=basis.angular, **vars(drawing))
+        return kind(**whole, activation=basis.activation, angular=basis.angular, **vars(drawing))
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write a file that appears complete or not at all.
@@ -261,14 +261,17 @@ class SplatScene:
         scales = device.get(splats.scales)
         check_range("scales", scales, np.inf)
         names = ("shape_modes", "color_modes", "lobes", *_LIGHT)
-        more = {name: getattr(splats, name) for name in names}
+        found = {name: getattr(splats, name) for name in names}
+        more: dict[str, Any] = {
+            name: None if array is None else device.get(array) for name, array in found.items()
+        }
         return cls(
             means=device.get(splats.means),
             log_scales=log_scales_of(scales),
             quats=device.get(splats.quats),
             logit_opacities=kept_strengths(device.get(splats.opacities), cls.mode, activation),
             sh=device.get(splats.sh),
-            **{name: None if array is None else device.get(array) for name, array in more.items()},
+            **more,
             activation=activation,
             angular=angular,
             **vars(drawing or SceneDrawing()),
