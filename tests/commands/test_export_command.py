@@ -133,6 +133,33 @@ def test_the_format_follows_from_the_extension(name, here, arrays):
     assert (here / out).read_bytes() == (here / "same").read_bytes()
 
 
+@pytest.mark.parametrize(
+    ("name", "out", "other"),
+    [
+        ("ply", "new.spz", "spz"),
+        ("glb", "new.SOG", "sog"),
+        ("spz", "new.compressed.ply", "compressed-ply"),
+        ("ply", "new.compressed.ply", "compressed-ply"),
+        ("sog", "new.stl", "stl"),
+    ],
+)
+def test_no_format_is_written_under_the_name_of_another(name, out, other, here, arrays, capsys):
+    SplatScene(**arrays).save(here / "ball.ply")
+    for more in ((), ("--dry-run",)):
+        assert export("ball.ply", "--to", name, "--out", out, *more) == 3
+        said = " ".join(capsys.readouterr().err.split())
+        assert f"--to {name} contradicts" in said and f"is that of {other}:" in said
+    assert export("ball.ply", "--mesh", "--to", "ply", "--out", "new.obj") == 3
+    assert [entry.name for entry in here.iterdir()] == ["ball.ply"]
+
+
+def test_names_without_a_format_and_plys_that_are_compressed_are_as_they_are_told(here, arrays):
+    SplatScene(**arrays).save(here / "ball.ply")
+    for name, out in (("spz", "new.bin"), ("spz", "new"), ("compressed-ply", "new.ply")):
+        assert export("ball.ply", "--to", name, "--out", out, "--quiet") == 0
+    assert b"element chunk" in (here / "new.ply").read_bytes()
+
+
 def test_an_extension_of_no_format_is_told(here, arrays, capsys):
     SplatScene(**arrays).save(here / "ball.ply")
     assert export("ball.ply", "--out", "film.webp") == 3

@@ -28,6 +28,8 @@ from rift_cl.progress import Report
 _PAGE = ".html"
 # What people call films, which are another command's.
 _FILMS = (".webm", ".mp4", ".gif", ".webp", ".png", ".apng")
+# An extension that two formats have, and the one that is meant where --to says so.
+_BOTH_PLY = ("ply", "compressed-ply")
 _UP = np.array([0.0, 1, 0])
 # What viewers add to splats on the screen, in square pixels.
 _VIEWERS = 0.3
@@ -142,23 +144,37 @@ def format_name(settings: ExportSettings, usual: str) -> str:
     """The format that is asked for: ``--to``, or else the extension of the file to write.
 
     Raises:
-        InputError: no format has this extension.
+        InputError: no format has this extension, or another than the one that --to names.
     """
+    by_suffix = None if settings.out is None else _format_of(settings.out)
     if settings.to is not None:
+        # A compressed PLY is one by its content: programs know it whatever comes before .ply.
+        if by_suffix not in (None, settings.to) and (by_suffix, settings.to) != _BOTH_PLY:
+            raise InputError(
+                f"--to {settings.to} contradicts the extension of --out {settings.out}, which is "
+                f"that of {by_suffix}: leave out --to, or name another file"
+            )
         return settings.to
+    if by_suffix is not None:
+        return by_suffix
     if settings.out is None or not settings.out.suffix:
         return usual
-    names: tuple[str, ...] = get_args(Target)
-    suffixes = {name: "." + name.replace("-", ".") for name in names}
-    # The longer ones first: .compressed.ply ends in .ply as well.
-    for name, suffix in sorted(suffixes.items(), key=lambda pair: -len(pair[1])):
-        if settings.out.name.lower().endswith(suffix):
-            return name
     film = settings.out.suffix.lower() in _FILMS
     raise InputError(
         f"{settings.out}: no export has the extension {settings.out.suffix}: name the format "
         + ("(--to), or make a film by 'rift render'" if film else "(--to)")
     )
+
+
+def _format_of(path: Path) -> str | None:
+    """The format whose extension a file has; None where no format has it."""
+    names: tuple[str, ...] = get_args(Target)
+    suffixes = {name: "." + name.replace("-", ".") for name in names}
+    # The longer ones first: .compressed.ply ends in .ply as well.
+    for name, suffix in sorted(suffixes.items(), key=lambda pair: -len(pair[1])):
+        if path.name.lower().endswith(suffix):
+            return name
+    return None
 
 
 def output_path(settings: ExportSettings, suffix: str) -> Path:
