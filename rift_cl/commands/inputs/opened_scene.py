@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from rift_cl.basis.angular.environment import blunted, picture_lobes
 from rift_cl.commands.cameras.fit_cameras import CAMERA_FILES, FitCameras, open_fit_cameras
 from rift_cl.commands.inputs.scene_bounds import bounds_of_splats
 from rift_cl.commands.run_folder.saved_settings import read_settings
@@ -110,14 +111,16 @@ class OpenedScene:
 
     def _relit(self, picture: Path) -> SplatScene:
         """The splats under another light."""
-        if self.splats.environment is None:
+        own, reflectance = self.splats.environment, self.splats.reflectance
+        if own is None or reflectance is None:
             raise InputError(
                 f"--environment {picture}: the splats of {self.path} reflect no light that could "
                 "be exchanged; fit them with 'rift fit photos --environment shared'"
             )
-        lobes = len(self.splats.environment)
-        light = read_environment_map(picture, lobes, display=self.light == "display")
-        return replace(self.splats, environment=light)
+        lobes = picture_lobes(len(own))
+        light = read_environment_map(picture, lobes, display=self.light == "display", like=len(own))
+        blunt = blunted(reflectance.astype(float), len(own), lobes).astype(np.float32)
+        return replace(self.splats, environment=light, reflectance=blunt)
 
     def _rendering(self) -> SplatSettings:
         """How the fit drew its splats; the defaults where there is no fit.
