@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from rift_cl.io.images.display_light import to_display
 from rift_cl.io.scenes.splat_activations import HARMONIC_0
 from rift_cl.io.scenes.splat_scene import SplatScene
 from rift_cl.io.volumes import read_volume, read_volume_place, suggested_window
@@ -67,7 +68,10 @@ def _points(path: Path) -> Layer:
     opacity = 1.0 if scene.mode == "xray" else 1 / (1 + np.exp(-scene.logit_opacities[kept]))
     colors = np.ones((len(kept), 4))
     if scene.lobes is None:
-        colors[:, :3] = np.clip(scene.sh[kept, 0] * HARMONIC_0 + 0.5, 0, 1)
+        shown = np.clip(scene.sh[kept, 0] * HARMONIC_0 + 0.5, 0, 1).astype(np.float32)
+        if scene.light == "linear":
+            to_display(shown)
+        colors[:, :3] = shown
     colors[:, 3] = opacity
     about = {
         "name": path.stem if len(kept) == len(scene) else f"{path.stem}, {len(kept)} splats",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gzip
 from pathlib import Path
 
 import numpy as np
@@ -68,6 +69,42 @@ def test_what_is_lost_is_said_before_and_nothing_is_written_on_a_dry_run(here, a
     assert "rift: modes become" in capsys.readouterr().err
 
 
+@pytest.mark.parametrize("name", ["html", *FORMATS])
+def test_antialiased_splats_are_told_of_whatever_the_format(name, here, arrays, capsys):
+    more = ("--dry-run", "--eps2d", 0.3)
+    for antialiased in (False, True):
+        SplatScene(**arrays, antialiased=antialiased).save(here / "ball.ply")
+        assert export("ball.ply", "--to", name, "--out", "new", *more) == 0
+        said = " ".join(capsys.readouterr().out.split())
+        assert ("Mip-Splatting" in said) == antialiased
+        assert ("no field of the format says so" in said) == (antialiased and name != "spz")
+
+
+def test_far_splats_of_spz_are_told_of_on_a_dry_run(here, capsys):
+    random = np.random.default_rng(1)
+    means = random.normal(size=(200, 3))
+    for farthest in (10, 1e6):
+        means[0] = [0, 0, farthest]
+        SplatScene(
+            means=means,
+            log_scales=np.full((200, 3), -3.0),
+            quats=np.tile([1.0, 0, 0, 0], (200, 1)),
+            logit_opacities=np.zeros(200),
+            sh=np.zeros((200, 1, 3)),
+        ).save(here / "ball.ply")
+        assert export("ball.ply", "--to", "spz", "--dry-run") == 0
+        said = " ".join(capsys.readouterr().out.split())
+        assert ("1 of 200 splats" in said) == (farthest == 1e6)
+
+
+def test_spz_says_whether_splats_are_antialiased(here, arrays, capsys):
+    for antialiased in (False, True):
+        SplatScene(**arrays, antialiased=antialiased).save(here / "ball.ply")
+        assert export("ball.ply", "--to", "spz", "--overwrite", "--eps2d", 0.3) == 0
+        assert gzip.decompress((here / "ball.spz").read_bytes())[14] == antialiased
+        assert ("the file says so" in " ".join(capsys.readouterr().err.split())) == antialiased
+
+
 def test_densities_of_xrays_are_no_splats_of_a_viewer(here, arrays, capsys):
     XrayScene(**arrays | {"sh": np.zeros((20, 1, 3))}).save(here / "bone.ply")
     assert export("bone.ply", "--to", "spz") == 3
@@ -94,6 +131,33 @@ def test_the_format_follows_from_the_extension(name, here, arrays):
     assert export("ball.ply", "--out", out, "--quiet") == 0
     assert export("ball.ply", "--out", "same", "--to", name, "--quiet") == 0
     assert (here / out).read_bytes() == (here / "same").read_bytes()
+
+
+@pytest.mark.parametrize(
+    ("name", "out", "other"),
+    [
+        ("ply", "new.spz", "spz"),
+        ("glb", "new.SOG", "sog"),
+        ("spz", "new.compressed.ply", "compressed-ply"),
+        ("ply", "new.compressed.ply", "compressed-ply"),
+        ("sog", "new.stl", "stl"),
+    ],
+)
+def test_no_format_is_written_under_the_name_of_another(name, out, other, here, arrays, capsys):
+    SplatScene(**arrays).save(here / "ball.ply")
+    for more in ((), ("--dry-run",)):
+        assert export("ball.ply", "--to", name, "--out", out, *more) == 3
+        said = " ".join(capsys.readouterr().err.split())
+        assert f"--to {name} contradicts" in said and f"is that of {other}:" in said
+    assert export("ball.ply", "--mesh", "--to", "ply", "--out", "new.obj") == 3
+    assert [entry.name for entry in here.iterdir()] == ["ball.ply"]
+
+
+def test_names_without_a_format_and_plys_that_are_compressed_are_as_they_are_told(here, arrays):
+    SplatScene(**arrays).save(here / "ball.ply")
+    for name, out in (("spz", "new.bin"), ("spz", "new"), ("compressed-ply", "new.ply")):
+        assert export("ball.ply", "--to", name, "--out", out, "--quiet") == 0
+    assert b"element chunk" in (here / "new.ply").read_bytes()
 
 
 def test_an_extension_of_no_format_is_told(here, arrays, capsys):

@@ -76,7 +76,7 @@ def test_a_turned_scene_looks_the_same_to_a_turned_camera() -> None:
 
 def test_plain_scenes_stay_as_they_are() -> None:
     given = scene()
-    found, notes = plain_scene(given, "display")
+    found, notes = plain_scene(given)
     assert notes == []
     for name in ("means", "log_scales", "quats", "logit_opacities", "sh"):
         np.testing.assert_array_equal(getattr(found, name), getattr(given, name))
@@ -86,7 +86,7 @@ def test_splats_that_are_not_drawn_are_left_out() -> None:
     given = scene()
     quats = given.quats.copy()
     quats[7] = 0
-    found, _ = plain_scene(dataclasses.replace(given, quats=quats), "display")
+    found, _ = plain_scene(dataclasses.replace(given, quats=quats))
     assert len(found) == 59
     np.testing.assert_array_equal(found.means, np.delete(given.means, 7, axis=0))
 
@@ -94,7 +94,7 @@ def test_splats_that_are_not_drawn_are_left_out() -> None:
 def test_linear_light_becomes_display_light_and_its_error_is_said() -> None:
     colors = np.random.default_rng(1).uniform(0.05, 0.9, (60, 3)).astype(np.float32)
     constant = ((colors - 0.5) / 0.28209479177387814)[:, None]
-    found, notes = plain_scene(scene(sh=constant), "linear")
+    found, notes = plain_scene(scene(sh=constant, light="linear"))
     to_display(colors)
     np.testing.assert_allclose(0.5 + 0.28209479177387814 * found.sh[:, 0], colors, atol=1e-5)
     assert "differ by 0.000" in notes[0] and "blend" in notes[1]
@@ -109,7 +109,7 @@ def test_lobes_become_the_nearest_harmonics() -> None:
         [np.zeros((60, 1, 3)), random.uniform(0, 0.2, (60, basis.n_linear - 1, 3))], 1
     )
     given = scene(lobes=lobes, angular="sg", sh=sh)
-    found, notes = plain_scene(given, "display")
+    found, notes = plain_scene(given)
     assert found.angular == "sh" and found.degree == 3
     said = float(notes[0].split("differ by ")[1].split()[0])
     assert said < 0.05
@@ -120,7 +120,7 @@ def test_lobes_become_the_nearest_harmonics() -> None:
 def test_activations_become_gaussians_of_the_same_peak_and_integral(activation: str) -> None:
     given = scene(1, activation=activation, means=np.zeros((1, 3)), logit_opacities=[2.5],
                   log_scales=np.full((1, 3), -1.4), sh=np.full((1, 1, 3), 1.5))  # fmt: skip
-    found, notes = plain_scene(given, "display")
+    found, notes = plain_scene(given)
     assert activation in notes[0]
     before, after = drawn(given)[..., 0], drawn(found)[..., 0]
     assert after.max() == pytest.approx(before.max(), rel=0.02)
@@ -136,7 +136,7 @@ def test_modes_become_the_gaussian_of_the_same_moments() -> None:
     color = np.zeros((1, 3, 3))
     color[0, 0] = 0.2
     given = scene(1, shape_modes=shape, color_modes=color)
-    found, notes = plain_scene(given, "display")
+    found, notes = plain_scene(given)
     assert "modes" in notes[0]
     frame = matrices_of(given.quats.astype(float))[0] * np.exp(given.log_scales[0])
     np.testing.assert_allclose(found.means[0], given.means[0] + 0.1 * frame[:, 0], atol=1e-4)
@@ -152,5 +152,5 @@ def test_modes_made_plain_look_like_what_they_were() -> None:
     random = np.random.default_rng(9)
     given = scene(shape_modes=random.normal(0, 0.2, (60, 9)))
     bare = dataclasses.replace(given, shape_modes=None)
-    found, _ = plain_scene(given, "display")
+    found, _ = plain_scene(given)
     assert psnr(drawn(found), drawn(given)) > psnr(drawn(bare), drawn(given)) + 1

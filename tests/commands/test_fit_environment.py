@@ -61,7 +61,7 @@ def test_a_rendering_takes_another_light(fitted, tmp_path):
 
 def test_other_viewers_get_harmonics(fitted, tmp_path):
     scene = rift.SplatScene.load(fitted / "scene.ply")
-    plain, notes = plain_scene(scene, "display")
+    plain, notes = plain_scene(scene)
     assert plain.environment is None and plain.sh.shape == (len(scene), 16, 3)
     assert any("shared light becomes harmonics" in note for note in notes)
     out = tmp_path / "plain.ply"
@@ -82,7 +82,7 @@ def test_harmonics_are_right_where_the_photographs_were_taken(fitted):
     right = basis.evaluate(scene.sh, None, ways) + 0.5 + reflected_light(*light)[:, 0]
     errors = []
     for given in ((), cameras):
-        plain, _ = plain_scene(scene, "display", given)
+        plain, _ = plain_scene(scene, given)
         found = SphericalHarmonics(3).evaluate(plain.sh, None, ways) + 0.5
         errors.append(np.abs(found - np.maximum(right, 0)).mean())
     assert errors[1] < 0.3 * errors[0]
@@ -90,7 +90,7 @@ def test_harmonics_are_right_where_the_photographs_were_taken(fitted):
 
 def test_scenes_without_a_light_cannot_be_lit(capture, fitted, tmp_path, capsys):
     scene = rift.SplatScene.load(fitted / "scene.ply")
-    plain_scene(scene, "display")[0].save(tmp_path / "plain.ply")
+    plain_scene(scene)[0].save(tmp_path / "plain.ply")
     light = ["--environment", str(fitted / "environment.exr"), "--out", str(tmp_path / "r")]
     assert main(["render", str(tmp_path / "plain.ply"), *light]) != 0
     assert "reflect no light" in capsys.readouterr().err

@@ -11,7 +11,19 @@ from PIL import Image
 from plyfile import PlyData
 
 import rift_cl as rift
-from rift_cl.basis.angular.environment import light_from
+from rift_cl.basis.angular.environment import (
+    blunted,
+    environment_of,
+    lattice_sharpness,
+    light_from,
+    picture_lobes,
+    reflected_light,
+)
+from rift_cl.basis.angular.environment import (
+    environment_axes as light_axes,
+)
+from rift_cl.commands.inputs.opened_scene import OpenedScene
+from rift_cl.commands.inputs.scene_input import SceneInput
 from rift_cl.errors import FileFormatError, InputError, NonFiniteError, ShapeError
 from rift_cl.io.images.environment_map import read_environment_map, write_environment_map
 from rift_cl.io.images.image import read_image, write_png
@@ -138,3 +150,71 @@ def test_pictures_of_another_shape_are_refused(tmp_path):
         read_environment_map(tmp_path / "two.png", 16, display=True)
     with pytest.raises(InputError):
         read_environment_map(tmp_path / "none.png", 16, display=True)
+
+
+def directions_of(count, seed=4):
+    found = np.random.default_rng(seed).normal(size=(count, 3))
+    return found / np.linalg.norm(found, axis=1, keepdims=True)
+
+
+def relit(tmp_path, picture, log_sharpness, lobes=128):
+    """What a splat of tint 1 shows under a picture, (D, 3), as the commands light it."""
+    write_png(tmp_path / "light.png", picture)
+    given = scene(1, lobes)
+    reflectance = np.array([[50.0] * 3 + [-50.0] * 3 + [log_sharpness]])
+    given = replace(given, normals=[[0, 0, 1]], reflectance=reflectance)
+    given.save(tmp_path / "a.ply")
+    how = SceneInput(tmp_path / "a.ply", environment=tmp_path / "light.png")
+    lit = OpenedScene(how).splats
+    return reflected_light(lit.normals, lit.reflectance, lit.environment, directions_of(4000))[0]
+
+
+@pytest.mark.parametrize("log_sharpness", [3.4, 9.0])
+def test_a_constant_picture_is_constant_light(tmp_path, log_sharpness):
+    shown = relit(tmp_path, np.full((32, 64, 3), 0.6), log_sharpness)
+    np.testing.assert_allclose(shown, 0.6, rtol=0.02)
+
+
+def test_a_soft_sky_beside_a_sharp_sun_is_soft(tmp_path):
+    """Ripples of the lattice were 10 % of the sky, and the sun lost or won up to half its light."""
+    picture = np.broadcast_to(np.linspace(0.5, 0.3, 64)[:, None, None], (64, 128, 3)).copy()
+    picture[14:17, 40:46] = 1
+    shown = relit(tmp_path, picture, 9.0)[:, 0]
+    mirrored = directions_of(4000) * [1, 1, -1]
+    polar, azimuth = (np.arange(64) + 0.5) / 64 * np.pi, (1 - (np.arange(128) + 0.5) / 64) * np.pi
+    ring = np.sin(polar)[:, None]
+    ways = [ring * np.cos(azimuth), ring * np.sin(azimuth), np.cos(polar)[:, None] + 0 * azimuth]
+    ways = np.stack(ways, -1).reshape(-1, 3)
+    weights = np.repeat(np.sin(polar), 128)
+    kernel = np.exp(lattice_sharpness(128) * (mirrored @ ways.T - 1)) * weights
+    blurred = kernel @ picture[..., 0].ravel() / kernel.sum(1)
+    sun = ways[15 * 128 + 43]
+    sky = mirrored @ sun < 0.7
+    assert np.sqrt(np.square(shown[sky] / blurred[sky] - 1).mean()) < 0.02
+    mean = weights @ picture[..., 0].ravel() / weights.sum()
+    assert shown.mean() == pytest.approx(mean, rel=0.02)
+
+
+def test_small_lamps_keep_their_light():
+    """By least squares, a lamp far smaller than a lobe had up to twice of it."""
+    ways, count = directions_of(3000, 7), 256
+    for place in range(0, 3000, 500):
+        lamp = np.zeros((3000, 3))
+        lamp[place] = 100
+        found = environment_of(lamp, ways, np.ones(3000), count, 64)
+        seen = np.exp(lattice_sharpness(64) * (ways @ light_axes(count).T - 1))
+        shown = seen @ np.exp(found) * lattice_sharpness(64) / lattice_sharpness(count)
+        np.testing.assert_allclose(shown.mean(0), lamp.mean(0), rtol=1e-3)
+
+
+def test_denser_lights_are_seen_as_blurred_as_those_of_fits():
+    reflectance = np.random.default_rng(9).normal(size=(20, 7))
+    reflectance[0, 6] = 30
+    for count in (16, 1024, 2048, 4096):
+        dense = picture_lobes(count)
+        other = blunted(reflectance, count, dense)
+        np.testing.assert_array_equal(other[:, :6], reflectance[:, :6])
+        kappa = np.minimum(np.exp(reflectance[:, 6]), 1e4)
+        wanted = 1 / kappa + 1 / lattice_sharpness(count)
+        np.testing.assert_allclose(np.exp(-other[:, 6]) + 1 / lattice_sharpness(dense), wanted)
+    assert picture_lobes(4096) == 4096

@@ -12,7 +12,7 @@ from rift_cl.errors import InputError
 from rift_cl.io.scenes.formats import palettes
 from rift_cl.io.scenes.formats.formats import FORMATS
 from rift_cl.io.scenes.formats.plain import along_curve, unit_quats
-from rift_cl.io.scenes.formats.spz import encode_spz, fraction_bits
+from rift_cl.io.scenes.formats.spz import encode_spz, fraction_bits, place_notes
 from rift_cl.io.scenes.splat_activations import opacities_of, scales_of
 from rift_cl.io.scenes.splat_scene import SplatScene, XrayScene
 
@@ -45,7 +45,7 @@ def test_what_is_read_back_is_what_was_written_within_the_levels(name: str, degr
     read = (read_compressed_ply if name == "compressed-ply" else read_spz)(content)
     apart = {key: np.abs(read[key]).max(initial=0) * 1e-6 + 1e-6 for key in read}
     if name == "spz":
-        places, scales, colors, rest = 0.5 ** fraction_bits(given) / 2, 1 / 32, 0.0037, 1 / 16
+        places, scales, colors, rest = 0.5 ** fraction_bits(given.means) / 2, 1 / 32, 0.0037, 1 / 16
     else:
         cut = [slice(k, k + 256) for k in range(0, len(given), 256)]
         boxes = [np.ptp(given.means[part], axis=0) for part in cut]
@@ -182,7 +182,7 @@ def test_spz_takes_the_finest_numbers_that_hold_the_scene() -> None:
         far = np.zeros((5, 3))
         far[0, 0] = -farthest
         moved = SplatScene(far, given.log_scales, given.quats, given.logit_opacities, given.sh)
-        assert fraction_bits(moved) == digits
+        assert fraction_bits(moved.means) == digits
         assert np.abs(read_spz(encode_spz(moved))["means"][:, 0]).max() == farthest
     with pytest.raises(InputError, match="scale the scene"):
         encode_spz(
@@ -191,3 +191,35 @@ def test_spz_takes_the_finest_numbers_that_hold_the_scene() -> None:
                 *(getattr(given, n) for n in ("log_scales", "quats", "logit_opacities", "sh")),
             )
         )
+
+
+def test_few_far_splats_do_not_make_the_places_of_spz_coarse() -> None:
+    """They stay in their directions from the middle, as wide to the eye, in their order."""
+    near = scene(597)
+    near = dataclasses.replace(near, log_scales=near.log_scales - 3)
+    means = np.concatenate([near.means, [[0, 9e5, 0], [0, 1e6, 0], [1e5, 0, -1e5]]])
+    more = {n: getattr(near, n) for n in ("log_scales", "quats", "logit_opacities", "sh")}
+    more = {name: np.concatenate([rows, rows[:3]]) for name, rows in more.items()}
+    more["log_scales"][-3:] = np.log(1e4)
+    given = SplatScene(means, **more)
+    order = np.linalg.norm(along_curve(given).means, axis=1).argsort()
+    read = read_spz(encode_spz(given))
+    found, wanted = (places[order] for places in (read["means"], along_curve(given).means))
+    assert np.abs(found[:-3] - wanted[:-3]).max() < 2.5e-4
+    middle = np.median(means, axis=0)
+    far, true = found[-3:] - middle, wanted[-3:] - middle
+    lengths, distances = np.linalg.norm(far, axis=1), np.linalg.norm(true, axis=1)
+    np.testing.assert_allclose(far / lengths[:, None], true / distances[:, None], atol=1e-6)
+    assert lengths[1] < lengths[2]
+    widths = np.exp(read["log_scales"][order][-3:]) / lengths[:, None]
+    np.testing.assert_allclose(widths, 1e4 / np.repeat(distances[:, None], 3, 1), rtol=0.04)
+    assert len(place_notes(near.means)) == 0
+    (note,) = place_notes(given.means)
+    assert note.startswith("3 of 600 splats") and "rounded by up to 0.00024 units" in note
+
+
+def test_a_scene_far_from_its_origin_is_rounded_and_told_of() -> None:
+    away = scene(600).means + np.float32([1e5, 0, 0])
+    assert fraction_bits(away) == 6
+    (note,) = place_notes(away)
+    assert "rounded by up to 0.0078 units" in note and "from the origin" in note

@@ -36,7 +36,7 @@ MOST_LOBES = 4096
 # ln kappa is held between these, as sharpness of lobes is.
 MOST_LOG_SHARPNESS = log(1e4)
 # Splats at a time; the least radiance that a light is taken to have, and steps towards one.
-_PARTS, _DARKEST, _STEPS = 64, 1e-8, 300
+_PARTS, _DARKEST, _STEPS = 64, 1e-8, 60
 
 
 @lru_cache(maxsize=8)
@@ -109,22 +109,50 @@ def reflected_light(
     return found
 
 
-def environment_of(light: Floats, directions: Floats, weights: Floats, count: int) -> Floats:
-    """The logarithms of radiance (K, 3) whose light is nearest to a given one in least squares.
+def picture_lobes(count: int) -> int:
+    """Lobes of a light that a picture gives to a scene whose own light has ``count``.
 
-    Multiplicative steps (Lee and Seung 2001) keep every lobe positive; lobes overlap so little that
-    these are near the end after some hundred.
+    Lobes as sharp as a fit's, on its own lattice, ripple: of a constant light they make 0.6 to 1.2
+    of it. On a lattice of four times as many, the light is flat to 1.5 %. Beyond 1024 lobes of the
+    scene there are fewer, since no light has more than 4096.
+    """
+    return min(4 * count, MOST_LOBES)
+
+
+def blunted(reflectance: Floats, count: int, dense: int) -> Floats:
+    """The reflectance (N, 7) that shows a light of ``dense`` lobes as blurred as one of ``count``.
+
+    Lobes of a denser lattice are sharper; variances add, so that the surface takes over the rest.
+    """
+    found = np.array(reflectance, float)
+    held = np.clip(found[:, 6], -MOST_LOG_SHARPNESS, MOST_LOG_SHARPNESS)
+    rest = 1 / lattice_sharpness(count) - 1 / lattice_sharpness(dense)
+    found[:, 6] = -np.log(np.exp(-held) + rest)
+    return found
+
+
+def environment_of(
+    light: Floats, directions: Floats, weights: Floats, count: int, like: int | None = None
+) -> Floats:
+    """The logarithms of radiance (K, 3) whose light is nearest to a given one.
+
+    Nearest by the Kullback-Leibler divergence, whose multiplicative steps (Richardson 1972, Lucy
+    1974) keep every lobe positive and the sum of the light what it was: by least squares a lamp
+    smaller than a lobe would give up to twice its light.
 
     Args:
         light: (M, 3) what comes from the directions, 0 or more.
         directions: (M, 3) of length one.
         weights: (M,) solid angles, to any factor.
         count: K.
+        like: number of lobes of the light that is to be matched in sharpness, at most K, as
+            ``blunted`` surfaces see it; K when not given.
     """
-    lobes = np.exp(lattice_sharpness(count) * (directions @ environment_axes(count).T - 1))
-    weighed = lobes * weights[:, None]
-    normal, wanted = weighed.T @ lobes, weighed.T @ light + _DARKEST
-    radiance = np.full((count, 3), max(float(light.mean()), _DARKEST))
+    own, seen = lattice_sharpness(count), lattice_sharpness(like or count)
+    lobes = np.exp(seen * (directions @ environment_axes(count).T - 1))
+    shares, wanted = weights / weights.sum(), light + _DARKEST
+    each = (shares @ lobes)[:, None]
+    radiance = np.tile(shares @ wanted / each.sum(), (count, 1))
     for _ in range(_STEPS):
-        radiance *= wanted / (normal @ radiance)
-    return np.asarray(np.log(np.maximum(radiance, _DARKEST)))
+        radiance *= lobes.T @ (shares[:, None] * wanted / (lobes @ radiance)) / each
+    return np.asarray(np.log(np.maximum(radiance, _DARKEST) * own / seen))

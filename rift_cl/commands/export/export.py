@@ -28,6 +28,8 @@ from rift_cl.progress import Report
 _PAGE = ".html"
 # What people call films, which are another command's.
 _FILMS = (".webm", ".mp4", ".gif", ".webp", ".png", ".apng")
+# An extension that two formats have, and the one that is meant where --to says so.
+_BOTH_PLY = ("ply", "compressed-ply")
 _UP = np.array([0.0, 1, 0])
 # What viewers add to splats on the screen, in square pixels.
 _VIEWERS = 0.3
@@ -53,9 +55,7 @@ class Export:
         self.format = self._format(format_name(settings, "html"))
         self.path = output_path(settings, self.format.suffix)
         self._bounds = settings.bounds(self.scene)
-        self.plain, self.notes = plain_scene(
-            self.scene.splats, self.scene.light, self._bounds.cameras
-        )
+        self.plain, self.notes = plain_scene(self.scene.splats, self._bounds.cameras)
         if self.plain.degree > DEGREE:
             kept = np.ascontiguousarray(self.plain.sh[:, : (DEGREE + 1) ** 2])
             self.plain = dataclasses.replace(self.plain, sh=kept)
@@ -76,11 +76,31 @@ class Export:
                 "changes with the direction is lost (other formats keep it; a fit with "
                 "--sh-degree 0 has nothing to lose by it)"
             )
-        if self.scene.rendering.eps2d != _VIEWERS:
-            self.notes.append(
+        places = (self.plain.means @ self.turn.T).astype(np.float32)
+        self.notes += self.format.place_notes(places)
+        self.notes += self._blur_notes()
+
+    def _blur_notes(self) -> list[str]:
+        """What viewers make of splats on the screen that the fit did not."""
+        eps2d, notes = self.scene.rendering.eps2d, list[str]()
+        if eps2d != _VIEWERS:
+            notes.append(
                 f"viewers blur by {_VIEWERS:g} square pixels, the scene was fitted with "
-                f"{self.scene.rendering.eps2d:g}: pictures smaller than the photographs look softer"
+                f"{eps2d:g}: pictures smaller than the photographs look softer"
             )
+        if self.scene.rendering.antialiased:
+            told = (
+                "the file says so, but viewers that do not heed it"
+                if self.format.antialiased
+                else "no field of the format says so, and viewers"
+            )
+            notes.append(
+                "the scene was fitted antialiased, with splats dimmed as blur widens them "
+                f"(Mip-Splatting): {told} draw small splats too opaque, unless antialiasing is "
+                "switched on in them (fit without --rendering.antialiased what is to be shown "
+                "elsewhere)"
+            )
+        return notes
 
     def _format(self, name: str) -> SplatFormat:
         if name == "html":
@@ -124,23 +144,37 @@ def format_name(settings: ExportSettings, usual: str) -> str:
     """The format that is asked for: ``--to``, or else the extension of the file to write.
 
     Raises:
-        InputError: no format has this extension.
+        InputError: no format has this extension, or another than the one that --to names.
     """
+    by_suffix = None if settings.out is None else _format_of(settings.out)
     if settings.to is not None:
+        # A compressed PLY is one by its content: programs know it whatever comes before .ply.
+        if by_suffix not in (None, settings.to) and (by_suffix, settings.to) != _BOTH_PLY:
+            raise InputError(
+                f"--to {settings.to} contradicts the extension of --out {settings.out}, which is "
+                f"that of {by_suffix}: leave out --to, or name another file"
+            )
         return settings.to
+    if by_suffix is not None:
+        return by_suffix
     if settings.out is None or not settings.out.suffix:
         return usual
-    names: tuple[str, ...] = get_args(Target)
-    suffixes = {name: "." + name.replace("-", ".") for name in names}
-    # The longer ones first: .compressed.ply ends in .ply as well.
-    for name, suffix in sorted(suffixes.items(), key=lambda pair: -len(pair[1])):
-        if settings.out.name.lower().endswith(suffix):
-            return name
     film = settings.out.suffix.lower() in _FILMS
     raise InputError(
         f"{settings.out}: no export has the extension {settings.out.suffix}: name the format "
         + ("(--to), or make a film by 'rift render'" if film else "(--to)")
     )
+
+
+def _format_of(path: Path) -> str | None:
+    """The format whose extension a file has; None where no format has it."""
+    names: tuple[str, ...] = get_args(Target)
+    suffixes = {name: "." + name.replace("-", ".") for name in names}
+    # The longer ones first: .compressed.ply ends in .ply as well.
+    for name, suffix in sorted(suffixes.items(), key=lambda pair: -len(pair[1])):
+        if path.name.lower().endswith(suffix):
+            return name
+    return None
 
 
 def output_path(settings: ExportSettings, suffix: str) -> Path:

@@ -7,6 +7,7 @@ fit.
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from importlib.util import find_spec
 from pathlib import Path
 
@@ -42,7 +43,7 @@ def leave_page(fit: Path, pictures: CapturePictures, announce: Callable[[str], N
     if find_spec("viser") is None:
         return None
     try:
-        scene = SplatScene.load(fit / "scene.ply")
+        scene = replace(SplatScene.load(fit / "scene.ply"), light=pictures.light)
         if len(scene) > _MOST:
             return None
         behind = np.asarray(pictures.behind, np.float32)
@@ -58,7 +59,7 @@ def leave_page(fit: Path, pictures: CapturePictures, announce: Callable[[str], N
 def _page(
     fit: Path, scene: SplatScene, pictures: CapturePictures, behind: NDArray[np.float32]
 ) -> str:
-    plain, _ = plain_scene(scene, pictures.light, pictures.cameras)
+    plain, _ = plain_scene(scene, pictures.cameras)
     bounds = bounds_of_cameras(pictures.cameras, bounds_of_splats(plain))
     camera, target = first_view(bounds)
     return web_page(

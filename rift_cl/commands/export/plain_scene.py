@@ -25,7 +25,6 @@ from rift_cl.basis.angular import SphericalHarmonics, angular_basis
 from rift_cl.basis.angular.environment import reflected_light
 from rift_cl.basis.hermite import Hermite
 from rift_cl.commands.export.axes import matrices_of, quaternions_of, sphere
-from rift_cl.commands.fit_photos.pictures import Light
 from rift_cl.commands.pictures.evenly_spaced import evenly
 from rift_cl.geometry import Camera
 from rift_cl.io.images.display_light import to_display
@@ -50,14 +49,11 @@ _THINNEST, _WIDEST = 0.05, 20.0
 _OPAQUE = 0.999
 
 
-def plain_scene(
-    scene: SplatScene, light: Light, cameras: Sequence[Camera] = ()
-) -> tuple[SplatScene, list[str]]:
+def plain_scene(scene: SplatScene, cameras: Sequence[Camera] = ()) -> tuple[SplatScene, list[str]]:
     """A scene that every viewer can render, and a sentence for each loss.
 
     Args:
-        scene: of photographs.
-        light: that its colours are in.
+        scene: of photographs; whether it is antialiased, and its eps2d, are kept.
         cameras: of the photographs: what splats reflect of an environment light is right as those
             see it, where they are given.
     """
@@ -73,14 +69,20 @@ def plain_scene(
     logits = scene.logit_opacities
     if not basis.plain:
         logits = _one_gaussian_each(scene, plain, notes)
-    if scene.lobes is not None or scene.environment is not None or light == "linear":
+    if scene.lobes is not None or scene.environment is not None or scene.light == "linear":
         centers = None
         if scene.environment is not None and cameras:
             centers = np.array([cameras[k].center for k in evenly(len(cameras), _CAMERAS)])
-        plain["sh"] = _harmonics(scene, plain["sh"], light, centers, notes)
+        plain["sh"] = _harmonics(scene, plain["sh"], centers, notes)
     rows = {name: values.astype(np.float32) for name, values in plain.items()}
     found = SplatScene(
-        rows["means"], rows["log_scales"], rows["quats"], logit_opacities=logits, sh=rows["sh"]
+        rows["means"],
+        rows["log_scales"],
+        rows["quats"],
+        logit_opacities=logits,
+        sh=rows["sh"],
+        antialiased=scene.antialiased,
+        eps2d=scene.eps2d,
     )
     return rows_of(found, shown), notes
 
@@ -107,7 +109,7 @@ def _one_gaussian_each(
 
 
 def _harmonics(
-    scene: SplatScene, given: Floats, light: Light, centers: Floats | None, notes: list[str]
+    scene: SplatScene, given: Floats, centers: Floats | None, notes: list[str]
 ) -> Floats:
     """Coefficients (N, K, 3) of harmonics in display light, from (N, L, 3) of what there is."""
     degree = scene.degree if scene.lobes is None else _DEGREE
@@ -119,7 +121,7 @@ def _harmonics(
     sh, total, looked = np.empty((len(scene), (degree + 1) ** 2, 3)), 0.0, _DIRECTIONS
     for start in range(0, len(scene), _BLOCK):
         here = slice(start, start + _BLOCK)
-        colors = _colors(scene, given, light, here, directions)
+        colors = _colors(scene, given, here, directions)
         if centers is None:
             sh[here] = np.einsum("km,nmc->nkc", solve, colors - 0.5)
             again = np.einsum("mk,nkc->nmc", functions, sh[here])
@@ -130,21 +132,21 @@ def _harmonics(
             elsewhere = _ELSEWHERE * looked / _DIRECTIONS
             normal = np.einsum("nvk,nvl->nkl", seen, seen) + elsewhere * functions.T @ functions
             wanted = elsewhere * np.einsum("mk,nmc->nkc", functions, colors - 0.5)
-            colors = _colors(scene, given, light, here, ways)
+            colors = _colors(scene, given, here, ways)
             wanted += np.einsum("nvk,nvc->nkc", seen, colors - 0.5)
             sh[here] = np.linalg.solve(normal, wanted)
             again = np.einsum("nvk,nkc->nvc", seen, sh[here])
         total += float(np.square(np.maximum(again + 0.5, 0) - colors).sum())
     what = [] if scene.lobes is None else [f"lobes ({scene.angular}) become harmonics"]
     what += [] if scene.environment is None else ["the shared light becomes harmonics"]
-    what += [] if light == "display" else ["linear light becomes display light"]
+    what += [] if scene.light == "display" else ["linear light becomes display light"]
     error = np.sqrt(total / (3 * looked * len(scene)))
     where = "all directions" if centers is None else "the directions of the photographs"
     notes.append(
         f"{' and '.join(what)}, by least squares over {where}: colours differ by {error:.3f} of 1 "
         "(root mean square)"
     )
-    if light == "linear":
+    if scene.light == "linear":
         notes.append(
             "viewers blend in display light: pictures come out darker wherever splats are seen "
             "through (fit in display light what is to be shown elsewhere)"
@@ -152,9 +154,7 @@ def _harmonics(
     return sh
 
 
-def _colors(
-    scene: SplatScene, given: Floats, light: Light, here: slice, directions: Floats
-) -> Floats:
+def _colors(scene: SplatScene, given: Floats, here: slice, directions: Floats) -> Floats:
     """Colours (n, D, 3) in display light of some splats along directions (D, 3) or (n, D, 3)."""
     lobes = None if scene.lobes is None else scene.lobes[here, None]
     basis = angular_basis(scene.angular, given.shape[1])
@@ -164,7 +164,7 @@ def _colors(
         assert normals is not None and reflectance is not None
         colors += reflected_light(normals[here], reflectance[here], scene.environment, directions)
     colors = np.maximum(np.nan_to_num(colors), 0)
-    if light == "linear":
+    if scene.light == "linear":
         shown = colors.astype(np.float32)
         to_display(shown)
         colors = shown.astype(np.float64)

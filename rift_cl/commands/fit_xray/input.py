@@ -19,7 +19,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rift_cl.cl.device import Device
-from rift_cl.commands.fit_photos.pictures import Light
 from rift_cl.commands.fit_xray.settings import FitXraySettings
 from rift_cl.commands.inputs.axis_alignment import Alignment
 from rift_cl.commands.inputs.row_doubts import row_doubts
@@ -43,6 +42,7 @@ from rift_cl.geometry.scan_cameras import ScanCameras, scan_cameras
 from rift_cl.geometry.seen_grid import scan_lengths, seen_grid
 from rift_cl.io.boundary import check_claim
 from rift_cl.io.scans.scan_file import ScanFile
+from rift_cl.io.scenes.scene_drawing import Light
 from rift_cl.reconstruct.direct.offset_axis import is_offset, seen_bins
 
 # Line integrals are measured by the value that this share of them stays below.

@@ -1,8 +1,9 @@
 """A scene as the commands take it: a file of splats, or the folder that a fit left behind.
 
 How wide splats are drawn (eps2d) is part of what was fitted: drawn otherwise, the same splats look
-softer or harder. So is the light that their colours are in, and what was behind them. A file of
-splats says none of it, the folder of a fit does. Modes, lobes and activation are in the file.
+softer or harder. So is what was behind them. The folder of a fit says so, a file does not.
+Modes, lobes and activation are in the file, and so are the light that colours are in and whether
+splats are antialiased, with the eps2d of that; those of older fits are in the folder alone.
 """
 
 from __future__ import annotations
@@ -15,14 +16,15 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from rift_cl.basis.angular.environment import blunted, picture_lobes
 from rift_cl.commands.cameras.fit_cameras import CAMERA_FILES, FitCameras, open_fit_cameras
-from rift_cl.commands.fit_photos.pictures import Light
 from rift_cl.commands.inputs.scene_bounds import bounds_of_splats
 from rift_cl.commands.run_folder.saved_settings import read_settings
 from rift_cl.errors import FileFormatError, InputError
 from rift_cl.io.images.display_light import to_display, to_linear
 from rift_cl.io.images.environment_map import read_environment_map
 from rift_cl.io.json_fields import Fields, read_json_object
+from rift_cl.io.scenes.scene_drawing import Light
 from rift_cl.io.scenes.splat_scene import SplatScene
 from rift_cl.splat.settings import SplatSettings
 
@@ -63,9 +65,13 @@ class OpenedScene:
             activation=self.splats.activation,
             angular=self.splats.angular,
         )
-        eps2d = settings.eps2d
-        self.rendering = rendering if eps2d is None else replace(rendering, eps2d=eps2d)
+        if self.splats.antialiased:
+            rendering = replace(rendering, antialiased=True)
+        for eps2d in (self.splats.eps2d, settings.eps2d):
+            rendering = rendering if eps2d is None else replace(rendering, eps2d=eps2d)
+        self.rendering = rendering
         self.light: Light = self._light()
+        self.splats = self._said()
         if settings.environment is not None:
             self.splats = self._relit(settings.environment)
         # What is behind the splats, in their light; None where neither user nor fit says so.
@@ -104,16 +110,24 @@ class OpenedScene:
         """
         return None if self.folder is None else open_fit_cameras(self.folder)
 
+    def _said(self) -> SplatScene:
+        """The splats with all that a file can say of how they are drawn."""
+        how = self.rendering
+        eps2d = how.eps2d if how.antialiased else self.splats.eps2d
+        return replace(self.splats, light=self.light, antialiased=how.antialiased, eps2d=eps2d)
+
     def _relit(self, picture: Path) -> SplatScene:
         """The splats under another light."""
-        if self.splats.environment is None:
+        own, reflectance = self.splats.environment, self.splats.reflectance
+        if own is None or reflectance is None:
             raise InputError(
                 f"--environment {picture}: the splats of {self.path} reflect no light that could "
                 "be exchanged; fit them with 'rift fit photos --environment shared'"
             )
-        lobes = len(self.splats.environment)
-        light = read_environment_map(picture, lobes, display=self.light == "display")
-        return replace(self.splats, environment=light)
+        lobes = picture_lobes(len(own))
+        light = read_environment_map(picture, lobes, display=self.light == "display", like=len(own))
+        blunt = blunted(reflectance.astype(float), len(own), lobes).astype(np.float32)
+        return replace(self.splats, environment=light, reflectance=blunt)
 
     def _rendering(self) -> SplatSettings:
         """How the fit drew its splats; the defaults where there is no fit.
@@ -144,8 +158,8 @@ class OpenedScene:
 
     def _light(self) -> Light:
         """The light that the splats' colours are in."""
-        if self._settings is None:
-            return "display"
+        if self._settings is None or self.splats.light == "linear":
+            return self.splats.light
         light = self._settings.text("light")
         if light == "linear":
             return "linear"

@@ -82,6 +82,7 @@ class OrbitInput(SceneInput):
     def _without_fit(self, fit: Path) -> str:
         return (
             f"{self.scene} is read without the fit that it lies in: camera path and up direction "
-            "are estimated from the splats, background and eps2d are the defaults (name the folder "
-            f"instead: {fit})."
+            "are estimated from the splats, background and eps2d are the defaults, and so are "
+            "light and antialiasing where the file does not say them (name the folder instead: "
+            f"{fit})."
         )

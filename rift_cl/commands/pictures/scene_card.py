@@ -9,6 +9,7 @@ import numpy as np
 
 from rift_cl.cl.discovery import default_device
 from rift_cl.commands.cameras.film_path import film
+from rift_cl.commands.inputs.opened_scene import in_display_light
 from rift_cl.commands.inputs.scene_bounds import bounds_of_splats
 from rift_cl.io.scenes.splat_scene import SplatScene
 from rift_cl.report.notebook import card
@@ -42,10 +43,16 @@ def scene_card(scene: SplatScene) -> str:
 
 def _picture(scene: SplatScene) -> bytes:
     device = default_device()
-    settings = SplatSettings(mode=scene.mode, activation=scene.activation, angular=scene.angular)
+    settings = SplatSettings(
+        mode=scene.mode,
+        activation=scene.activation,
+        angular=scene.angular,
+        antialiased=scene.antialiased,
+        eps2d=SplatSettings.eps2d if scene.eps2d is None else scene.eps2d,
+    )
     camera = film(bounds_of_splats(scene), frames=1, size=_SIZE, fov=_FOV)[0]
     image = Renderer(settings, device=device).picture(scene.upload(device), camera).image
     if scene.mode == "xray":
         image = image.mean(axis=2)
         return jpeg(image, window=(0.0, float(np.percentile(image, 99.9)) or 1.0))
-    return jpeg(np.clip(image, 0, 1))
+    return jpeg(in_display_light(image, scene.light))

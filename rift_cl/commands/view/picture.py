@@ -7,7 +7,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rift_cl.commands.fit_photos.pictures import Light
 from rift_cl.commands.inputs.opened_scene import in_display_light
 from rift_cl.commands.inputs.scene_bounds import SceneBounds
 from rift_cl.commands.pictures.depth_picture import depth_and_alpha, depth_picture, window_of
@@ -16,6 +15,7 @@ from rift_cl.commands.view.photographs import Photograph, compared, seen_by, tak
 from rift_cl.commands.view.wish import KINDS, Wish
 from rift_cl.errors import RiftError
 from rift_cl.geometry import Camera
+from rift_cl.io.scenes.scene_drawing import Light
 from rift_cl.splat.renderer import Renderer
 from rift_cl.splat.splats import Splats
 

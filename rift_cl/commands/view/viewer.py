@@ -21,7 +21,6 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rift_cl.commands.cameras.film_path import first_view
-from rift_cl.commands.fit_photos.pictures import Light
 from rift_cl.commands.inputs.scene_bounds import SceneBounds
 from rift_cl.commands.view.browser_splats import MovingSplats
 from rift_cl.commands.view.crop import Crop
@@ -33,6 +32,7 @@ from rift_cl.commands.view.standpoint import standpoint_of
 from rift_cl.commands.view.wish import Wish
 from rift_cl.errors import InputError, RiftError
 from rift_cl.geometry import Camera
+from rift_cl.io.scenes.scene_drawing import Light
 from rift_cl.splat.renderer import Renderer
 from rift_cl.splat.splats import Splats
 

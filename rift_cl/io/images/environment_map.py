@@ -53,7 +53,7 @@ def write_environment_map(
 
 
 def read_environment_map(
-    path: str | os.PathLike[str], lobes: int, *, display: bool
+    path: str | os.PathLike[str], lobes: int, *, display: bool, like: int | None = None
 ) -> NDArray[np.float32]:
     """The light that a picture shows, as natural logarithms of radiance, (K, 3).
 
@@ -62,6 +62,8 @@ def read_environment_map(
             light.
         lobes: K.
         display: whether the radiance shall be in display light.
+        like: number of lobes of the light that is to be matched in sharpness; see
+            ``environment_of``.
 
     Raises:
         InputError: there is no such file, or its picture has another shape or two channels.
@@ -92,7 +94,7 @@ def read_environment_map(
     if display:
         to_display(light)
     directions, weights = _directions(len(light))
-    found = environment_of(light.reshape(-1, 3).astype(float), directions, weights, lobes)
+    found = environment_of(light.reshape(-1, 3).astype(float), directions, weights, lobes, like)
     return found.astype(np.float32)
 
 

@@ -8,7 +8,8 @@ Splats of X-rays have a property ``log_density`` in place of ``opacity``, the na
 the density at the peak. To a viewer of photographs their file lacks a property: it can refuse it,
 but cannot show it as what it is not.
 
-What splats have beside all that, modes, lobes and light, is in ``rift_cl.io.scenes.splat_basis``.
+What splats have beside all that, modes, lobes and light, is in ``rift_cl.io.scenes.splat_basis``;
+how they are to be drawn in ``rift_cl.io.scenes.scene_drawing``.
 """
 
 from __future__ import annotations
@@ -25,6 +26,7 @@ from rift_cl.errors import FileFormatError
 from rift_cl.io.boundary import check_claim
 from rift_cl.io.scenes.ply_body import read_blocks, record_runs
 from rift_cl.io.scenes.ply_header import PlyHeader, read_header
+from rift_cl.io.scenes.scene_drawing import SceneDrawing, read_drawing
 from rift_cl.io.scenes.splat_basis import SceneBasis, light_comments, read_basis, read_light
 from rift_cl.splat.settings import SplatMode
 
@@ -44,8 +46,8 @@ _LISTED = 4
 
 def read_ply(
     path: Path, file: BufferedReader, *, budget: int | None
-) -> tuple[SplatMode, SceneBasis, Arrays]:
-    """Read the kind, basis and arrays of a scene from a file that is open at its beginning.
+) -> tuple[SplatMode, SceneBasis, SceneDrawing, Arrays]:
+    """Read a scene's kind, basis, drawing and arrays from a file that is open at its beginning.
 
     Raises:
         FileFormatError: the file is damaged, or holds no splats.
@@ -56,6 +58,11 @@ def read_ply(
     if _STRENGTHS["xray"] in header.properties and _STRENGTHS["light"] not in header.properties:
         mode = "xray"
     basis = read_basis(path, header.comments, header.properties)
+    drawing = read_drawing(path, header.comments)
+    if mode == "xray" and not drawing.usual:
+        raise FileFormatError(
+            f"{path}: says {drawing.words!r} of X-rays, which know none; the file is damaged"
+        )
     coefficients = _coefficients(path, header, mode, basis)
     header.check_size(path, file.seek(0, 2))
     each = 11 + 3 * coefficients + basis.numbers
@@ -71,7 +78,7 @@ def read_ply(
             for name, column in columns.items():
                 column[start : start + len(block)] = block[name]
         start += len(block)
-    return mode, basis, arrays
+    return mode, basis, drawing, arrays
 
 
 def encode_ply(scene: SplatScene) -> tuple[int, Iterator[bytes]]:
@@ -85,6 +92,9 @@ def encode_ply(scene: SplatScene) -> tuple[int, Iterator[bytes]]:
         lines.insert(2, _COMMENT)
     if scene.environment is not None:
         lines[2:2] = light_comments(scene.environment)
+    drawing = SceneDrawing.of(scene)
+    if not drawing.usual:
+        lines.insert(2, drawing.comment)
     if not basis.plain:
         lines.insert(2, basis.comment)
     lines += [f"property float {name}" for name in names]

@@ -13,7 +13,7 @@ import os
 from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,6 +23,7 @@ from rift_cl.cl.host_arrays import as_host_array, as_real_array, check_finite
 from rift_cl.errors import FileFormatError, InputError, OutputError, ShapeError
 from rift_cl.io.boundary import reading
 from rift_cl.io.output import atomic_path, check_space
+from rift_cl.io.scenes.scene_drawing import Light, SceneDrawing
 from rift_cl.io.scenes.splat_activations import (
     check_range,
     drawn_strengths,
@@ -63,6 +64,9 @@ class SplatScene:
         environment: (K, 3) natural logarithms of the radiance of that light's lobes, or None.
         activation: that densities are drawn with; see ``SplatSettings``.
         angular: what colours vary in; see ``SplatSettings``.
+        light: that colours are in: ``display`` or ``linear``.
+        antialiased: whether splats are dimmed as ``eps2d`` widens them; see ``SplatSettings``.
+        eps2d: that they were fitted with, in square pixels; None where that is not known.
 
     Raises:
         ShapeError: an array does not fit the others.
@@ -84,6 +88,9 @@ class SplatScene:
     environment: NDArray[np.float32] | None = None
     activation: Activation = "clamp"
     angular: str = "sh"
+    light: Light = "display"
+    antialiased: bool = False
+    eps2d: float | None = None
     mode: ClassVar[SplatMode] = "light"
 
     def __post_init__(self) -> None:
@@ -92,6 +99,8 @@ class SplatScene:
             as_real_array(getattr(self, n), name=f"SplatScene: {n}") for n in ("means", "sh")
         )
         count, basis = means.shape[0] if means.ndim else 0, SceneBasis.of(self)
+        for name, value in vars(SceneDrawing.of(self)).items():
+            object.__setattr__(self, name, value)
         lobed = self.angular != "sh"
         if sh.ndim != 3 or not (lobed or sh.shape[1] in COEFFICIENTS):
             words = "K of the lobes" if lobed else "K = 1, 4, 9, 16 or 25"
@@ -159,12 +168,12 @@ class SplatScene:
         """
         path = Path(path)
         with reading(path, "the scene"):
-            mode, basis, arrays = _read(path, budget=budget)
+            mode, basis, drawing, arrays = _read(path, budget=budget)
         if basis.environment:
             check_finite(arrays["environment"], name=f"{path}: environment")
-        arrays = whole_splats(path, mode, arrays)
+        whole: dict[str, Any] = whole_splats(path, mode, arrays)
         kind: type[SplatScene] = XrayScene if mode == "xray" else SplatScene
-        return kind(**arrays, activation=basis.activation, angular=basis.angular)
+        return kind(**whole, activation=basis.activation, angular=basis.angular, **vars(drawing))
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write a file that appears complete or not at all.
@@ -175,7 +184,8 @@ class SplatScene:
 
         Raises:
             InputError: the ending is another, or a .splat file cannot hold the scene: one that is
-                empty, or of X-rays, or has modes, lobes, an environment light or an activation.
+                empty, or of X-rays, or has modes, lobes, an environment light, an activation or
+                linear light, or is antialiased.
             OutputError: the file cannot be written.
         """
         path = Path(path)
@@ -186,6 +196,9 @@ class SplatScene:
         basis = SceneBasis.of(self)
         if path.suffix.lower() == ".splat" and not basis.plain:
             raise InputError(f"{path}: a .splat file holds no {basis.named}: save a .ply")
+        drawing = SceneDrawing.of(self)
+        if path.suffix.lower() == ".splat" and not drawing.usual:
+            raise InputError(f"{path}: a .splat file cannot say {drawing.words!r}: save a .ply")
         size, blocks = _ENCODERS[path.suffix.lower()](self)
         check_space(path, size)
         with atomic_path(path) as part:
@@ -218,6 +231,7 @@ class SplatScene:
         *,
         activation: Activation = "clamp",
         angular: str = "sh",
+        drawing: SceneDrawing | None = None,
     ) -> SplatScene:
         """Copy splats back from a device.
 
@@ -229,6 +243,8 @@ class SplatScene:
             device: where they are.
             activation: that they are drawn with.
             angular: what their colours vary in.
+            drawing: the light that their colours are in, and how they are dimmed; display light
+                and not at all when not given.
 
         Raises:
             InputError: the splats have covariances, own colours or no harmonics, or a scale or
@@ -245,16 +261,20 @@ class SplatScene:
         scales = device.get(splats.scales)
         check_range("scales", scales, np.inf)
         names = ("shape_modes", "color_modes", "lobes", *_LIGHT)
-        more = {name: getattr(splats, name) for name in names}
+        found = {name: getattr(splats, name) for name in names}
+        more: dict[str, Any] = {
+            name: None if array is None else device.get(array) for name, array in found.items()
+        }
         return cls(
             means=device.get(splats.means),
             log_scales=log_scales_of(scales),
             quats=device.get(splats.quats),
             logit_opacities=kept_strengths(device.get(splats.opacities), cls.mode, activation),
             sh=device.get(splats.sh),
-            **{name: None if array is None else device.get(array) for name, array in more.items()},
+            **more,
             activation=activation,
             angular=angular,
+            **vars(drawing or SceneDrawing()),
         )
 
 
@@ -270,7 +290,7 @@ class XrayScene(SplatScene):
 
 def _read(
     path: Path, *, budget: int | None
-) -> tuple[SplatMode, SceneBasis, dict[str, NDArray[np.float32]]]:
+) -> tuple[SplatMode, SceneBasis, SceneDrawing, dict[str, NDArray[np.float32]]]:
     if path.exists() and not path.is_file():
         raise InputError(f"{path}: is not a file")
     with path.open("rb") as file:
@@ -279,5 +299,6 @@ def _read(
         if start in _PLY_STARTS:
             return read_ply(path, file, budget=budget)
         if path.suffix.lower() == ".splat":
-            return "light", SceneBasis(), read_splat(path, file, budget=budget)
+            arrays = read_splat(path, file, budget=budget)
+            return "light", SceneBasis(), SceneDrawing(), arrays
     raise FileFormatError(f"{path}: is no PLY file, and no .splat file by its name")

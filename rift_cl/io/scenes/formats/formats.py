@@ -5,11 +5,14 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
+import numpy as np
+from numpy.typing import NDArray
+
 from rift_cl.io.scenes.formats.compressed_ply import encode_compressed_ply
 from rift_cl.io.scenes.formats.gltf import encode_glb
 from rift_cl.io.scenes.formats.plain import check_plain
 from rift_cl.io.scenes.formats.sog import encode_sog
-from rift_cl.io.scenes.formats.spz import encode_spz
+from rift_cl.io.scenes.formats.spz import encode_spz, place_notes
 from rift_cl.io.scenes.splat_ply import encode_ply
 from rift_cl.io.scenes.splat_scene import SplatScene
 
@@ -26,12 +29,16 @@ class SplatFormat:
         encode: from a scene of plain splats to the bytes of a file.
         upright: whether its files have y up; the others keep the axes of the scene.
         rounds: what of a splat is not kept to the bit.
+        antialiased: whether its files can say that splats are antialiased.
+        place_notes: what is to be said of places (N, 3), a sentence each.
     """
 
     suffix: str
     encode: Callable[[SplatScene], bytes]
     upright: bool
     rounds: str
+    antialiased: bool = False
+    place_notes: Callable[[NDArray[np.float32]], list[str]] = lambda means: []
 
 
 def _plain_ply(scene: SplatScene) -> bytes:
@@ -44,7 +51,14 @@ FORMATS = {
     "compressed-ply": SplatFormat(
         ".compressed.ply", encode_compressed_ply, False, "everything, within chunks of 256 splats"
     ),
-    "spz": SplatFormat(".spz", encode_spz, True, "everything, harmonics most"),
+    "spz": SplatFormat(
+        ".spz",
+        encode_spz,
+        True,
+        "everything, harmonics most",
+        antialiased=True,
+        place_notes=place_notes,
+    ),
     "sog": SplatFormat(".sog", encode_sog, False, "everything, to palettes made for the scene"),
     "glb": SplatFormat(".glb", encode_glb, True, "nothing"),
 }

@@ -34,8 +34,8 @@ def check_plain(scene: SplatScene, degree: int) -> None:
     """Check that a format can hold the scene.
 
     Raises:
-        InputError: it holds no splats, densities, modes, lobes, an activation, or harmonics above
-            ``degree``.
+        InputError: it holds no splats, densities, modes, lobes, an activation, linear light, or
+            harmonics above ``degree``.
     """
     if scene.mode == "xray":
         raise InputError("the scene holds densities of X-rays, which no viewer of splats draws")
@@ -43,6 +43,8 @@ def check_plain(scene: SplatScene, degree: int) -> None:
         raise InputError("the scene holds no splats, there is nothing to write")
     if not SceneBasis.of(scene).plain:
         raise InputError(f"the format holds no {SceneBasis.of(scene).named}: convert it first")
+    if scene.light != "display":
+        raise InputError(f"the format holds no light {scene.light}: convert it first")
     if scene.degree > degree:
         raise InputError(f"the format holds harmonics to degree {degree}, not {scene.degree}")
 
