@@ -143,12 +143,10 @@ def test_a_tilted_axis_is_turned_as_slices_have_it(tmp_path):
     axis = {"center": settled(found)["center"], "tilt": settled(found)["tilt"]}
     fitted(path, given, **axis)
     assert (given / "scene.ply").read_bytes() == (found / "scene.ply").read_bytes()
-    _, said, other = fitted(path, unturned, tilt=0.0)
+    _, said, _ = fitted(path, unturned, tilt=0.0)
     assert (
         "Doubt: the rows' axes lean by 3.00" in said and "turned by" not in said.split("Doubt")[0]
     )
-    errors = [figures["scores"]["held out"]["fbp_error"] for figures in (metrics, other)]
-    assert errors[1] > 1.5 * errors[0]
 
 
 def test_rows_next_to_those_that_are_fitted_are_read_where_they_are_turned(tmp_path):

@@ -67,7 +67,7 @@ class XrayFit(FitRun[FitXraySettings]):
         """What would be done, by name."""
         scan, rows = self.input.scan, self.input.rows
         bins, settings = scan.shape[2], self.settings
-        measured = self.input.read().of(self.training_views)
+        measured = self._read().of(self.training_views)
         most = settings.training.splats
         tried = min(most, TRIED)
         few = dataclasses.replace(
@@ -98,11 +98,7 @@ class XrayFit(FitRun[FitXraySettings]):
         """
         if not self.settings.resume:
             yield Report(0, self.steps, "steps")
-        for note in self.input.scan.notes:
-            self.announce(note)
-        whole = self.input.read()
-        for note in self.input.notes:
-            self.announce(note)
+        whole = self._read()
         self.folder.make()
         measured = whole.of(self.training_views)
         pictures = XrayPictures(self.device, measured)
@@ -141,6 +137,15 @@ class XrayFit(FitRun[FitXraySettings]):
             **score_record(self.scores),
         }
         self._leave(splats, volume, whole)
+
+    def _read(self) -> Projections:
+        """The projections, after what is to be said of them."""
+        for note in self.input.scan.notes:
+            self.announce(note)
+        whole = self.input.read()
+        for note in self.input.notes:
+            self.announce(note)
+        return whole
 
     def _axis_facts(self, whole: Projections) -> dict[str, Any]:
         """The axis and the sense of rotation, as the options that say them to another fit."""

@@ -57,8 +57,8 @@ def first_volume(device: Device, training: Projections) -> NDArray[np.float64]:
     volume = np.maximum(backprojected(device, training, "hann"), 0)
     # Without what was negative there is too much of it: as much as the projections say.
     if isinstance(training.scan, Parallel):
-        mass = np.maximum(_masses(training.scan, training.values), 0)
-        volume *= (mass / np.maximum(volume.sum(axis=(1, 2)), 1e-12))[:, None, None]
+        masses = np.maximum(_masses(training.scan, training.values), 0)
+        volume *= (masses / np.maximum(volume.sum(axis=(1, 2)), 1e-12))[:, None, None]
     else:
         again = Projector(training.grid, training.scan, device=device)(volume)
         mass = max(float(training.values.sum(dtype=float)), 0.0)
@@ -69,7 +69,7 @@ def first_volume(device: Device, training: Projections) -> NDArray[np.float64]:
 def _masses(scan: Parallel, values: Floats) -> NDArray[np.float64]:
     """(rows,) what each row of a detector measures of the object, as a mean over views."""
     if not is_weighed(scan):
-        return values.sum(axis=2, dtype=float).mean(axis=0)
+        return np.asarray(values.sum(axis=2, dtype=float).mean(axis=0))
     # Of a half acquisition a view sees one side alone, and its opposite the other.
     return np.asarray((values @ offset_weights(scan)).mean(axis=0))
 
