@@ -149,6 +149,14 @@ def test_brightness_is_a_factor_of_each_picture():
     found = brightness([0.5, 1, 2])
     assert found.spread == pytest.approx(np.std(np.log([0.5, 1, 2])), rel=1e-5)
     assert found.explained == pytest.approx(1)
+    # Pixels that do not count say nothing of it.
+    counted = np.zeros((4, 5), bool)
+    counted[1:3] = True
+    masked = [
+        ViewScore("", 0.0, {}, np.where(counted[..., None], f * i, 1), i, counted=counted)
+        for f, i in zip([0.5, 1, 2], images, strict=True)
+    ]
+    assert brightness_of(masked).spread == pytest.approx(found.spread, rel=1e-5)
     # What is wrong in other ways is no matter of brightness.
     assert brightness([0.9, 1, 1.1], 0.5).explained < 0.2
     assert brightness_of([]) == (0, 0)

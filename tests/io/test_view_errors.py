@@ -25,16 +25,22 @@ def test_budget(tmp_path: Path) -> None:
     """Nothing is decoded that does not fit, and what fits takes no more than was said."""
     size = (600, 800)
     write_png(tmp_path / "a.png", np.full((*size, 3), 90, np.uint8))
+    write_png(tmp_path / "cut.png", np.full((*size, 4), 90, np.uint8))
     write_png(tmp_path / "m.png", np.full(size, 255, np.uint8))
     lens = Lens("OPENCV", (-0.2, 0.05, 0.002, -0.003), K)
     for view in (
         view_of(tmp_path / "a.png"),
         view_of(tmp_path / "a.png", tmp_path / "m.png"),
         view_of(tmp_path / "a.png", tmp_path / "m.png", lens),
+        view_of(tmp_path / "cut.png", tmp_path / "m.png"),
+        view_of(tmp_path / "cut.png", None, lens),
+        view_of(tmp_path / "cut.png", tmp_path / "m.png", lens),
     ):
-        numbers = 7 + (3 if view.mask else 0) + (8 if view.lens else 0)
+        numbers = (
+            7 + (view.image.name == "cut.png") + (3 if view.mask else 0) + (8 if view.lens else 0)
+        )
         need = 4 * numbers * size[0] * size[1]
-        with pytest.raises(ResourceLimitError, match=r"a\.png: .*claims"):
+        with pytest.raises(ResourceLimitError, match=r"\.png: .*claims"):
             read_view(view, budget=need - 1)
         read_view(view, downscale=2, budget=need)
         tracemalloc.start()
