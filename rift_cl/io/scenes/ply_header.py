@@ -170,8 +170,8 @@ def _vertex(path: Path, order: str, elements: Sequence[_Element]) -> int:
     names = [element.name for element in elements]
     if "chunk" in names:
         raise FileFormatError(
-            f"{path}: is a compressed PLY, which is written here and not read: convert it to a "
-            "plain one ('npx @playcanvas/splat-transform IN OUT.ply', or SuperSplat's export)"
+            f"{path}: is a compressed PLY, which is written here and not read: convert it by "
+            "'npx @playcanvas/splat-transform IN.compressed.ply OUT.ply', or in SuperSplat"
         )
     if names.count("vertex") != 1:
         shown = ", ".join(f"element {name!r}" for name in names)[:_SHOWN]
