@@ -21,7 +21,7 @@ from rift_cl.io.volumes import read_volume, read_volume_place, suggested_window
 
 Layer = tuple[NDArray[Any], dict[str, Any], str]
 
-_VOLUMES, _SCENES = (".h5", ".zarr", ".mrc"), (".ply", ".splat")
+_VOLUMES, _SCENES = (".h5", ".zarr", ".mrc"), (".ply", ".splat", ".spz")
 # Points that napari turns smoothly; of more splats those that are seen most are taken.
 _MOST_POINTS = 100_000
 

@@ -115,8 +115,8 @@ def test_lists_in_a_ply_are_not_followed(tmp_path: Path) -> None:
     path = made.point_cloud(tmp_path / "points.ply")
     faces = b"element face 1\nproperty list uint double v\nend_header"
     path.write_bytes(path.read_bytes().replace(b"end_header", faces) + b"\xff" * 8)
-    with pytest.raises(FileFormatError, match="element 'face'"):
-        open_capture(tmp_path)
+    points = open_capture(tmp_path).points
+    assert points is not None and len(points) > 0
 
 
 def test_a_point_cloud_may_name_faces_that_it_has_not(tmp_path: Path) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import struct
 from pathlib import Path
 
@@ -12,6 +13,7 @@ from plyfile import PlyData
 from splat_files import sigmoid
 
 import rift_cl as rift
+from rift_cl.errors import FileFormatError
 
 DEGREES = pytest.mark.parametrize("degree", range(5))
 C0 = 0.28209479177387814
@@ -160,3 +162,46 @@ def test_extremes_survive_a_splat_file(tmp_path: Path) -> None:
     assert sorted(sigmoid(rift.SplatScene.load(tmp_path / "b.splat").logit_opacities)) == sorted(
         opacities
     )
+
+
+def beside(count: int, *kinds: str) -> np.ndarray:
+    """Records of an element of another program."""
+    return np.ones(count, [(f"p{k}", kind) for k, kind in enumerate(kinds)])
+
+
+@pytest.mark.parametrize("text", [False, True])
+def test_elements_behind_the_splats_are_left_out(tmp_path: Path, text: bool) -> None:
+    """As SHARP of Apple writes them: a camera, the size of its image and what else it knows."""
+    wanted = made.scene(7, 1)
+    elements = (
+        ("vertex", made.records(wanted)),
+        ("extrinsic", beside(16, "f4")),
+        ("image_size", beside(2, "u4")),
+        ("version", beside(3, "u1")),
+    )
+    path = made.write(tmp_path / "a.ply", *elements, text=text)
+    made.assert_same(rift.SplatScene.load(path), wanted)
+    if not text:
+        os.truncate(path, path.stat().st_size - 1)
+        with pytest.raises(FileFormatError, match="cut off"):
+            rift.SplatScene.load(path)
+
+
+@pytest.mark.parametrize("order", ["<", ">"])
+def test_elements_of_plain_numbers_before_the_splats_are_skipped(tmp_path: Path, order) -> None:
+    wanted = made.scene(7, 1)
+    elements = (("camera", beside(3, "f8", "u1")), ("vertex", made.records(wanted)))
+    path = made.write(tmp_path / "a.ply", *elements, order=order)
+    made.assert_same(rift.SplatScene.load(path), wanted)
+    made.write(path, *elements, text=True)
+    with pytest.raises(FileFormatError, match="'camera' before 'vertex'"):
+        rift.SplatScene.load(path)
+
+
+def test_lists_behind_the_splats_are_not_followed(tmp_path: Path) -> None:
+    wanted = made.scene(7, 1)
+    wanted.save(tmp_path / "a.ply")
+    content = (tmp_path / "a.ply").read_bytes()
+    faces = b"element face 5\nproperty list uint double v\nend_header"
+    (tmp_path / "a.ply").write_bytes(content.replace(b"end_header", faces) + b"\xff" * 3)
+    made.assert_same(rift.SplatScene.load(tmp_path / "a.ply"), wanted)

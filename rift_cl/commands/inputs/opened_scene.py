@@ -194,7 +194,7 @@ def scene_file(path: Path) -> Path:
     if not path.is_dir():
         return path
     if not (path / _SCENE).is_file():
-        raise InputError(f"{path}: holds no {_SCENE}; name a .ply or .splat file, or a fit")
+        raise InputError(f"{path}: holds no {_SCENE}; name a .ply, .spz or .splat file, or a fit")
     return path / _SCENE
 
 

@@ -21,7 +21,7 @@ class SceneInput:
     group: ClassVar[str] = "input"
 
     scene: Annotated[Path, Positional]
-    """A .ply or .splat file, or the folder of a 'rift fit'."""
+    """A .ply, .spz or .splat file, or the folder of a 'rift fit'."""
     eps2d: Auto[float] = None
     """Variance added to every splat on the screen, in square pixels. Default: that of the fit, or
     0.3 for a file."""

@@ -66,7 +66,7 @@ def _text_blocks(path: Path, file: BufferedReader, header: PlyHeader) -> Iterato
                     "was cut off"
                 )
             yield _table(path, rows, run.start, width).view(record)[:, 0]
-        if next(lines, None) is not None:
+        if header.after is not None and next(lines, None) is not None:
             raise FileFormatError(f"{path}: holds more than the {header.count} records it claims")
 
 

@@ -7,7 +7,7 @@ once, by one parser, so that what was checked is also what is used to read the b
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from io import BufferedReader
 from pathlib import Path
@@ -41,16 +41,33 @@ _LONGEST = 1 << 20
 _SHOWN = 60
 
 
+@dataclass
+class _Element:
+    """An element that a header announces; ``listed`` where a record's size is its own."""
+
+    name: str
+    count: int
+    properties: dict[str, str]
+    listed: bool = False
+
+    @property
+    def size(self) -> int:
+        """Bytes of all binary records."""
+        return self.count * sum(int(kind[1]) for kind in self.properties.values())
+
+
 @dataclass(frozen=True)
 class PlyHeader:
-    """What a PLY file with one element, of scalar properties, says of itself.
+    """What a PLY file says of its element ``vertex``, of scalar properties, and of where it lies.
 
     Args:
         order: "<" or ">" for the byte order of a binary body, empty for text.
         count: number of records.
         properties: NumPy's types without byte order, by name, as they follow each other.
-        offset: bytes before the body.
+        offset: bytes before the records.
         comments: without the word that begins them.
+        after: bytes of other elements behind the records of a binary body; None where that is not
+            known, and in a text where there are some.
     """
 
     order: str
@@ -58,6 +75,7 @@ class PlyHeader:
     properties: dict[str, str]
     offset: int
     comments: tuple[str, ...] = ()
+    after: int | None = 0
 
     @property
     def record(self) -> np.dtype[np.void]:
@@ -75,20 +93,26 @@ class PlyHeader:
         each = sum(int(kind[1]) for kind in self.properties.values())
         # In a text every number takes a digit and, but for the last, a space or a new line.
         need = self.count * each if self.order else self.count * 2 * len(self.properties) - 1
-        if need > body or (self.order and need < body):
-            least = "" if self.order else "at least "
+        need += self.after or 0
+        exact = self.order and self.after is not None
+        if need > body or (exact and need < body):
+            least = "" if exact else "at least "
             raise FileFormatError(
                 f"{path}: claims {self.count} records, {least}{format_bytes(need)}, but "
-                f"{format_bytes(body)} ({body} bytes) follow its header; it was cut off or damaged"
+                f"{format_bytes(max(body, 0))} ({max(body, 0)} bytes) follow its header; it was "
+                "cut off or damaged"
             )
 
 
 def read_header(path: Path, file: BufferedReader) -> PlyHeader:
     """Parse the header of a file that is open at its beginning.
 
+    Elements behind ``vertex`` are left out, and so are those before it of scalar properties in a
+    binary file.
+
     Raises:
-        FileFormatError: it is damaged, or it describes anything but one element ``vertex`` of
-            scalar properties.
+        FileFormatError: it is damaged, or it describes no element ``vertex`` of scalar properties
+            that can be found without reading others.
     """
     start = file.read(_LONGEST)
     # The first line shows how lines end in this header.
@@ -99,55 +123,72 @@ def read_header(path: Path, file: BufferedReader) -> PlyHeader:
     if first is None or end < 0:
         raise FileFormatError(f"{path}: has no PLY header; the file is damaged or something else")
     lines = start[first.end() : end].decode("latin-1").split(newline.decode())
-    order, count, properties = _parse(path, lines)
+    order, elements = _parse(path, lines)
     comments = tuple(line[8:].strip() for line in lines if line.startswith("comment "))
-    return PlyHeader(order, count, properties, end + len(last), comments)
+    place = _vertex(path, order, elements)
+    vertex, behind = elements[place], elements[place + 1 :]
+    before = sum(element.size for element in elements[:place])
+    after: int | None = sum(element.size for element in behind)
+    if any(element.count and (element.listed or not order) for element in behind):
+        after = None
+    offset = end + len(last) + before
+    return PlyHeader(order, vertex.count, vertex.properties, offset, comments, after)
 
 
-def _parse(path: Path, lines: Iterable[str]) -> tuple[str, int, dict[str, str]]:
+def _parse(path: Path, lines: Iterable[str]) -> tuple[str, list[_Element]]:
+    """The byte order, and the elements in theirs."""
     order: str | None = None
-    count: int | None = None
-    properties: dict[str, str] = {}
-    empty = False
+    elements: list[_Element] = []
     for number, line in enumerate(lines, 2):
         match line.split():
             case [] | ["comment" | "obj_info", *_]:
                 pass
             case ["format", name, "1.0"] if order is None and name in _ORDERS:
                 order = _ORDERS[name]
-            case ["element", _, "0"] if count is not None:
-                # An element without records, such as the faces of a cloud: nothing to read.
-                empty = True
-            case ["property", *_] if empty:
-                pass
             case ["element", name, amount] if order is not None:
-                _demand_vertex(path, name, first=count is None)
-                count = _counted(path, amount)
-            case ["property", "list", *_]:
-                raise FileFormatError(
-                    f"{path}: has a list property, as meshes have; wanted plain numbers alone"
-                )
-            case ["property", kind, name] if count is not None and kind in _TYPES:
-                if name in properties:
+                elements.append(_Element(name, _counted(path, amount), {}))
+            case ["property", "list", count, kind, _] if (
+                elements and count in _TYPES and kind in _TYPES
+            ):
+                elements[-1].listed = True
+            case ["property", kind, name] if elements and kind in _TYPES:
+                if name in elements[-1].properties:
                     raise FileFormatError(f"{path}: has two properties {name[:_SHOWN]!r}")
-                properties[name] = _TYPES[kind]
+                elements[-1].properties[name] = _TYPES[kind]
             case _:
                 raise FileFormatError(
                     f"{path}: line {number} of its header is {line[:_SHOWN]!r}, which has no "
                     "meaning there; the file is damaged or is no PLY 1.0"
                 )
-    if order is None or count is None:
+    if order is None or not elements:
         raise FileFormatError(f"{path}: its header has no format or no element")
-    return order, count, properties
+    return order, elements
 
 
-def _demand_vertex(path: Path, name: str, *, first: bool) -> None:
-    if first and name == "vertex":
-        return
-    hint = "; unpack a compressed PLY first" if name == "chunk" else ""
-    raise FileFormatError(
-        f"{path}: has an element {name[:_SHOWN]!r}, wanted one element 'vertex' alone{hint}"
-    )
+def _vertex(path: Path, order: str, elements: Sequence[_Element]) -> int:
+    """The number of the element ``vertex``, whose records can be found."""
+    names = [element.name for element in elements]
+    if "chunk" in names:
+        raise FileFormatError(
+            f"{path}: is a compressed PLY, which is written here and not read: convert it by "
+            "'npx @playcanvas/splat-transform IN.compressed.ply OUT.ply', or in SuperSplat"
+        )
+    if names.count("vertex") != 1:
+        shown = ", ".join(f"element {name!r}" for name in names)[:_SHOWN]
+        raise FileFormatError(f"{path}: has {shown}, wanted one element 'vertex'")
+    place = names.index("vertex")
+    for element in elements[: place + 1]:
+        if element.listed and (element.count or element.name == "vertex"):
+            raise FileFormatError(
+                f"{path}: its element {element.name[:_SHOWN]!r} has a list property, as meshes "
+                "have; wanted plain numbers alone"
+            )
+    if not order and any(element.count for element in elements[:place]):
+        raise FileFormatError(
+            f"{path}: has an element {names[0][:_SHOWN]!r} before 'vertex', which is read of "
+            "binary files alone"
+        )
+    return place
 
 
 def _counted(path: Path, amount: str) -> int:

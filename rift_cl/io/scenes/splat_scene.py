@@ -34,6 +34,7 @@ from rift_cl.io.scenes.splat_activations import (
 from rift_cl.io.scenes.splat_basis import SceneBasis
 from rift_cl.io.scenes.splat_file import encode_splat, read_splat
 from rift_cl.io.scenes.splat_ply import COEFFICIENTS, encode_ply, read_ply, scene_shapes
+from rift_cl.io.scenes.spz_file import read_spz
 from rift_cl.io.scenes.whole_splats import whole_splats
 from rift_cl.splat.settings import Activation, SplatMode
 from rift_cl.splat.splats import Splats
@@ -146,12 +147,13 @@ class SplatScene:
 
     @classmethod
     def load(cls, path: str | os.PathLike[str], *, budget: int | None = None) -> SplatScene:
-        """Read a .ply file of 3D Gaussian splatting, whatever its name is, or a .splat file.
+        """Read a .ply file of 3D Gaussian splatting, whatever its name is, an .spz or a .splat.
 
         A PLY file may be text or binary of either byte order, with its properties in any order,
-        of any scalar type, and with others between them, which are left out. A .splat file has
-        no signature and is known by its name. Splats that cannot be drawn, since a number of
-        theirs is NaN or infinite, are left out, and a warning counts them.
+        of any scalar type, and with others between them or elements beside them, which are left
+        out. The other formats are known by their names; an .spz file is read in its own axes, y
+        up. Splats that cannot be drawn, since a number of theirs is NaN or infinite, are left out,
+        and a warning counts them.
 
         Args:
             path: the file.
@@ -301,4 +303,26 @@ def _read(
         if path.suffix.lower() == ".splat":
             arrays = read_splat(path, file, budget=budget)
             return "light", SceneBasis(), SceneDrawing(), arrays
-    raise FileFormatError(f"{path}: is no PLY file, and no .splat file by its name")
+        if path.suffix.lower() == ".spz":
+            drawing, arrays = read_spz(path, file, budget=budget)
+            return "light", SceneBasis(), drawing, arrays
+    raise FileFormatError(
+        f"{path}: is no PLY file, and no .spz or .splat file by its name{_way_out(path, start)}"
+    )
+
+
+def _way_out(path: Path, start: bytes) -> str:
+    """What can be done with a file of another format, by its first bytes or its name."""
+    if start == b"glTF" or path.suffix.lower() in (".glb", ".gltf"):
+        return (
+            "; splats in glTF are written here and not read: export what they were made of "
+            "('rift export SCENE --to ply')"
+        )
+    if start == b"PK\x03\x04" or path.suffix.lower() in (".sog", ".ksplat"):
+        return (
+            "; SOG and other compressed splats are not read: convert them by "
+            "'npx @playcanvas/splat-transform IN OUT.ply'"
+        )
+    if start.startswith(b"\x1f\x8b"):
+        return "; it is a gzip stream: end its name in .spz where it is SPZ"
+    return ""
