@@ -48,6 +48,7 @@ OTHERS = {
     "rendering.far": 5.0,
     "rendering.tile": 8,
     "homogenise": 0.75,
+    "tilt": 1.5,
     "preset": "lobes",
     "environment": "shared",
 }

@@ -196,3 +196,28 @@ def test_splats_stand_where_the_slices_do(tmp_path, rows):
     np.testing.assert_allclose(mass @ scene.means / mass.sum(), middle[::-1], atol=0.2)
     # Heights count from the detector's row 0, whichever rows are fitted.
     assert middle[0] == pytest.approx(5.5 * 0.5 - 0.3, abs=0.15)
+
+
+@pytest.mark.parametrize("kind", ["part of a turn", "helix", "displaced"])
+def test_cones_that_no_formula_takes_are_fitted(tmp_path, kind):
+    """Of a helix it is the held-out views that leave uneven steps."""
+    turn, center, height, more = np.arange(72) * np.pi / 36, 11.5, 1.5, {}
+    if kind == "part of a turn":
+        turn = np.radians(np.linspace(-40, 40, 36))
+    elif kind == "helix":
+        turn = np.arange(96) * np.pi / 24
+        more = {"heights": np.linspace(-1, 1, 96)}
+    else:
+        turn, center, height = turn[:60], 5.0, 20.0
+    scan = rift.Cone(turn, 10, 24, 1.0, 60.0, 120.0, center=(4.5, center), **more)
+    balls = [
+        rift.phantom.Ellipsoid((0.0, 0.3, -0.3), (height, 4.5, 4.0), 0.0, 0.05),
+        rift.phantom.Ellipsoid((0.2, 2.0, 1.0), (0.9, 1.0, 1.0), 0.0, 0.05),
+    ]
+    y = rift.phantom.project(balls, seen_grid(scan), scan)
+    path = saved(tmp_path / "scan.npz", y, turn, center=np.array(scan.center), **more, **LENGTHS)
+    _, said, metrics = fitted(path, tmp_path / "fit", center=center, kind="attenuation")
+    assert "20 steps of conjugate gradients stand in for it" in said
+    assert "cgls, sirt and tv" not in said
+    assert metrics["start_error"] < 0.4
+    assert metrics["scores"]["held out"]["fbp_error"] < 0.15

@@ -23,6 +23,7 @@ from rift_cl.commands.fit_xray.scores import (
     first_volume,
     relative_error,
     score_projections,
+    stand_in_note,
 )
 from rift_cl.commands.fit_xray.settings import FitXraySettings
 from rift_cl.commands.pictures.evenly_spaced import evenly
@@ -143,6 +144,7 @@ class XrayFit(FitRun[FitXraySettings]):
         for note in self.input.scan.notes:
             self.announce(note)
         whole = self.input.read()
+        self.input.notes += stand_in_note(self.device, whole.of(self.training_views))
         for note in self.input.notes:
             self.announce(note)
         return whole

@@ -90,7 +90,7 @@ def _show_slices(page: Page, splats: Floats, voxels: Floats) -> None:
     window = display_window([volume[k] for k in few for volume in (splats, voxels)])
     what = (
         "Attenuation per unit of length: left of the splats, as means over voxels, right by "
-        "filtered backprojection of the same views"
+        "filtered backprojection of the same views, or what stands in for it"
     )
     show_slices(
         page,

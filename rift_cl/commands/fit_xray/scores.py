@@ -1,8 +1,10 @@
 """How good a fit to X-rays is: projections that it never saw, beside what needs no fit.
 
 Two baselines: the filtered backprojection of the training views, projected again, and the mean of
-the two training views nearest in angle. The peak of PSNR is the largest value of the scan's
-projections; the relative error is the norm of the difference over that of the truth.
+the two training views nearest in angle. Where no formula takes the views of a cone, as over a part
+of a turn, or along a helix of which some are held out, conjugate gradients stand in for the first.
+The peak of PSNR is the largest value of the scan's projections; the relative error is the norm of
+the difference over that of the truth.
 """
 
 from __future__ import annotations
@@ -16,19 +18,31 @@ from numpy.typing import NDArray
 from rift_cl.cl.device import Device
 from rift_cl.commands.fit_photos.scores import ViewScore
 from rift_cl.commands.fit_xray.input import Projections, flipped
-from rift_cl.geometry import Camera, Parallel
+from rift_cl.errors import InputError
+from rift_cl.geometry import Camera, Cone, Parallel
 from rift_cl.metrics import psnr
 from rift_cl.operators import Projector
-from rift_cl.reconstruct import fbp
-from rift_cl.reconstruct.direct.offset_axis import is_weighed, offset_weights
+from rift_cl.reconstruct import cgls, fbp
+from rift_cl.reconstruct.direct.filtered_backprojection import filtered_backprojection
+from rift_cl.reconstruct.direct.offset_axis import (
+    is_full_turn,
+    is_weighed,
+    offset_weights,
+    sees_further,
+)
+from rift_cl.reconstruct.direct.padding import is_truncated
+from rift_cl.reconstruct.direct.redundancy import ITERATE
 from rift_cl.splat.renderer import Renderer
 from rift_cl.splat.splats import Splats
+
+# Steps of conjugate gradients, where no formula takes the views.
+_STEPS = 20
 
 SCORING = (
     "Line integrals of projections that were not trained on, means over them. PSNR in dB, its peak "
     "the scan's largest line integral; the error is relative, in L2. 'fbp' is the filtered "
-    "backprojection of the training views, projected again, 'blend' the mean of the two training "
-    "views nearest in angle."
+    "backprojection of the training views, or what stands in for it, projected again, 'blend' the "
+    "mean of the two training views nearest in angle."
 )
 COLUMNS = ("pictures", "score", "fit", "fbp", "blend")
 
@@ -45,11 +59,48 @@ def score_rows(metrics: Mapping[str, Any]) -> list[tuple[Any, ...]]:
 
 
 def backprojected(device: Device, training: Projections, filter: str = "ram-lak") -> Floats:
-    """The filtered backprojection of some views, zero where not every view sees."""
+    """The filtered backprojection of some views, zero where not every view sees.
+
+    Least squares by conjugate gradients, without a filter, where it does not take them.
+    """
     A = Projector(training.grid, training.scan, device=device)
-    volume = np.asarray(fbp(A, training.values, filter))
+    refused = refusal(device, training)
+    volume = np.asarray(
+        cgls(A, training.values, _STEPS) if refused else fbp(A, training.values, filter)
+    )
     y, x = np.meshgrid(*(training.grid.coordinates(axis) for axis in (1, 2)), indexing="ij")
     return np.where(np.hypot(x, y) <= training.reach, volume, 0).astype(np.float32)
+
+
+def refusal(device: Device, training: Projections) -> str:
+    """Why filtered backprojection does not take some views; empty where it does."""
+    scan = training.scan
+    if isinstance(scan, Parallel):
+        return ""
+    A = Projector(training.grid, scan, device=device)
+    try:
+        filtered_backprojection(A)
+    except InputError as error:
+        return str(error).removesuffix(f"; {ITERATE}")
+    one_sided = isinstance(scan, Cone) and sees_further(scan.center[1], scan.bins)
+    if one_sided and not is_full_turn(training.angles) and is_truncated(training.values):
+        return (
+            "the object reaches beyond the shorter side of the detector, and the views do not go "
+            "all round"
+        )
+    return ""
+
+
+def stand_in_note(device: Device, training: Projections) -> list[str]:
+    """What stands in for filtered backprojection where it does not take the training views."""
+    refused = refusal(device, training)
+    if not refused:
+        return []
+    return [
+        f"Filtered backprojection does not take the views that are trained on ({refused}): "
+        f"{_STEPS} steps of conjugate gradients stand in for it as what the fit begins with, and "
+        "as 'fbp' in scores and report."
+    ]
 
 
 def first_volume(device: Device, training: Projections) -> NDArray[np.float64]:
