@@ -19,6 +19,7 @@ from rift_cl.io.captures.point_cloud import write_point_cloud
 from rift_cl.io.checkpoint import Checkpoint, save_checkpoint
 from rift_cl.io.images.image import write_png
 from rift_cl.io.images.pixels import write_pixels
+from rift_cl.io.scenes.formats.spz import encode_spz
 from rift_cl.io.scenes.splat_scene import SplatScene
 from rift_cl.sample.stock_lenses import stock_lens
 from stress.valid_folders import FOLDERS
@@ -55,6 +56,8 @@ def _splats(name: str) -> bytes:
         logit_opacities=np.full(_SPLATS, 1.0),
         sh=random.normal(size=(_SPLATS, 1, 3)),
     )
+    if name.endswith(".spz"):
+        return encode_spz(scene)
     return _written(name, scene.save)
 
 
@@ -150,6 +153,7 @@ OTHERS = {
     "OpenEXR": Kind(".exr", partial(_pixels, "openexr", "a.exr"), read="image"),
     "splats PLY": Kind(".ply", partial(_splats, "a.ply"), read="splats"),
     "splats .splat": Kind(".splat", partial(_splats, "a.splat"), read="splats"),
+    "splats SPZ": Kind(".spz", partial(_splats, "a.spz"), read="splats"),
     "points PLY": Kind(".ply", _points, read="points"),
     "transforms JSON": Kind(".json", _transforms, read="capture"),
     "cameras JSON": Kind(".json", _camera, read="cameras"),
