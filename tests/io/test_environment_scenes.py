@@ -106,6 +106,7 @@ def test_a_light_comes_back_from_its_picture(tmp_path, display):
     light = np.random.default_rng(2).normal(-2, 1, (32, 3)).astype(np.float32)
     write_environment_map(tmp_path / "a.exr", light, display=display)
     found = read_environment_map(tmp_path / "a.exr", 32, display=display)
+    assert len(found) == len(light)
     directions = np.random.default_rng(3).normal(size=(200, 3))
     directions /= np.linalg.norm(directions, axis=1, keepdims=True)
     given, again = (light_from(a.astype(float), directions) for a in (light, found))
@@ -125,6 +126,11 @@ def test_up_is_at_the_top_x_in_the_middle_and_y_left_of_it(tmp_path):
     again = read_image(tmp_path / "b.exr")
     assert again[2, :, 0].min() > 2 * again[-3:, :, 0].max()
     assert again[64, 128, 1] == again[..., 1].max() or again[64, 128, 1] > again[64, 64, 1]
+
+
+def test_what_its_lobes_would_ripple_over_is_a_denser_light(tmp_path):
+    write_png(tmp_path / "a.png", np.full((32, 64, 3), 0.5))
+    assert len(read_environment_map(tmp_path / "a.png", 32, display=True)) == 128
 
 
 def test_a_small_lamp_does_not_fall_between_pixels(tmp_path):

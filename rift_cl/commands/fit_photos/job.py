@@ -43,6 +43,7 @@ from rift_cl.io.captures.capture import (
     capture_name,
 )
 from rift_cl.io.images.environment_map import write_environment_map
+from rift_cl.io.scenes.scene_drawing import SceneDrawing
 from rift_cl.io.scenes.splat_scene import SplatScene
 from rift_cl.progress import Report
 from rift_cl.splat.bands import FrameMemory
@@ -211,7 +212,13 @@ class Fit(FitRun[FitPhotosSettings]):
         splats = trainer.parameters.drawn
         drawn = trainer.renderer.settings
         fitted = SplatScene.of(
-            splats, self.device, activation=drawn.activation, angular=drawn.angular
+            splats,
+            self.device,
+            activation=drawn.activation,
+            angular=drawn.angular,
+            drawing=SceneDrawing(
+                settings.light, drawn.antialiased, drawn.eps2d if drawn.antialiased else None
+            ),
         )
         fitted.save(settings.out / "scene.ply")
         if fitted.environment is not None:

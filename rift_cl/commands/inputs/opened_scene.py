@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from rift_cl.basis.angular.environment import blunted, picture_lobes
+from rift_cl.basis.angular.environment import blunted
 from rift_cl.commands.cameras.fit_cameras import CAMERA_FILES, FitCameras, open_fit_cameras
 from rift_cl.commands.inputs.scene_bounds import bounds_of_splats
 from rift_cl.commands.run_folder.saved_settings import read_settings
@@ -124,10 +124,9 @@ class OpenedScene:
                 f"--environment {picture}: the splats of {self.path} reflect no light that could "
                 "be exchanged; fit them with 'rift fit photos --environment shared'"
             )
-        lobes = picture_lobes(len(own))
-        light = read_environment_map(picture, lobes, display=self.light == "display", like=len(own))
-        blunt = blunted(reflectance.astype(float), len(own), lobes).astype(np.float32)
-        return replace(self.splats, environment=light, reflectance=blunt)
+        light = read_environment_map(picture, len(own), display=self.light == "display")
+        blunt = blunted(reflectance.astype(float), len(own), len(light))
+        return replace(self.splats, environment=light, reflectance=blunt.astype(np.float32))
 
     def _rendering(self) -> SplatSettings:
         """How the fit drew its splats; the defaults where there is no fit.

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from skimage.transform import resize_local_mean
 
-from rift_cl.basis.angular.environment import environment_of, light_from
+from rift_cl.basis.angular.environment import environment_of, light_from, picture_lobes
 from rift_cl.cl.host_arrays import check_finite
 from rift_cl.errors import InputError
 from rift_cl.io.images.display_light import to_display, to_linear
@@ -24,6 +24,8 @@ from rift_cl.io.output import atomic_path
 
 # Rows of a picture that is written, and most of one that a light is found from.
 _ROWS, _MOST_ROWS = 128, 64
+# What lobes may lack of a picture that is theirs, as a share of it, root mean square.
+_EXACT = 0.02
 # Formats whose numbers are linear light.
 _LINEAR = (".exr", ".hdr")
 
@@ -53,17 +55,19 @@ def write_environment_map(
 
 
 def read_environment_map(
-    path: str | os.PathLike[str], lobes: int, *, display: bool, like: int | None = None
+    path: str | os.PathLike[str], lobes: int, *, display: bool
 ) -> NDArray[np.float32]:
     """The light that a picture shows, as natural logarithms of radiance, (K, 3).
+
+    K is ``lobes`` where such a light makes the picture, as it makes that of a fit, and otherwise
+    ``picture_lobes`` of it, to be seen by surfaces that are ``blunted``: on a denser lattice light
+    is as blurred, and does not ripple.
 
     Args:
         path: a picture twice as wide as high; OpenEXR and HDR in linear light, others in display
             light.
-        lobes: K.
+        lobes: of the scene's own light.
         display: whether the radiance shall be in display light.
-        like: number of lobes of the light that is to be matched in sharpness; see
-            ``environment_of``.
 
     Raises:
         InputError: there is no such file, or its picture has another shape or two channels.
@@ -94,7 +98,11 @@ def read_environment_map(
     if display:
         to_display(light)
     directions, weights = _directions(len(light))
-    found = environment_of(light.reshape(-1, 3).astype(float), directions, weights, lobes, like)
+    wanted = light.reshape(-1, 3).astype(float)
+    found = environment_of(wanted, directions, weights, lobes)
+    off = weights @ (light_from(found, directions) - wanted) ** 2
+    if off.sum() > _EXACT**2 * (weights @ wanted**2).sum():
+        found = environment_of(wanted, directions, weights, picture_lobes(lobes), lobes)
     return found.astype(np.float32)
 
 
