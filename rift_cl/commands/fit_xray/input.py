@@ -142,9 +142,10 @@ class XrayInput:
 
     @property
     def raised(self) -> float:
-        """Height of the slices' middle in the scan's unit; a fit has it at 0.
+        """How much higher splats stand in the scan than in a fit, in the scan's unit.
 
-        That of a cone is the height above the source's orbit there as here.
+        A fit of parallel beams has the middle of the rows at 0, the scan the detector's row 0; both
+        have the source's orbit of a cone there.
         """
         if self.scan.cone is not None:
             return 0.0

@@ -71,7 +71,8 @@ class FilteredBackprojection(Composite):
         filter: a name (``ram-lak``, ``shepp-logan``, ``cosine``, ``hamming``, ``hann``,
             ``high-pass``), a filter, or a function of frequency.
         compensate: what each view stands for. ``uniform``: every view the same. ``voronoi``: half
-            the gaps to its neighbours. None: as ``voronoi`` where no gap is a hole, else as
+            the gaps to its neighbours; in a half acquisition to those on the whole circle, as the
+            opposite ones show another side. None: as ``voronoi`` where no gap is a hole, else as
             ``uniform``. ``capped-voronoi``, ``pipe-menon`` and ``exact`` depend on frequency, and
             are the ones for random, clustered and limited angles; on even angles they are the
             plain ramp.
