@@ -121,6 +121,8 @@ _OF_PHOTOS: dict[str, Settings] = {
 _LOGITS = "learning_rates.logits"
 _OF_XRAYS: dict[str, Settings] = {
     "defaults": {},
+    # Those of the search before, which found these.
+    "as before": times(2, _MEANS, _LOGITS, usual=_XRAY),
     **{
         f"{name} {word}": times(factor, *changed, usual=_XRAY)
         for name, changed in (
@@ -131,8 +133,6 @@ _OF_XRAYS: dict[str, Settings] = {
         )
         for word, factor in (("x 2", 2), ("/ 2", 0.5))
     },
-    "positions / 4": times(0.25, _MEANS, usual=_XRAY),
-    "positions and densities / 2": times(0.5, _MEANS, _LOGITS, usual=_XRAY),
     "positions hold longer": {"learning_rates.means_last": 0.5},
     "shapes fall": {"learning_rates.shapes_last": 0.25},
     "cooldown 0.25": {"cooldown": 0.25},

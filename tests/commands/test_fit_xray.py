@@ -52,7 +52,8 @@ def test_a_scan_becomes_densities_slices_and_a_report(scans, tmp_path, capsys, r
     out = tmp_path / "fit"
     splats = 400 * rows
     by = "coverage" if rows == 1 else "ramp"
-    assert fit(path, out, "--homogenise", "0.5", "--homogenise-by", by, splats=splats) == 0
+    more = ("--homogenise", "0.5", "--homogenise-by", by, "--steps", "120")
+    assert fit(path, out, *more, splats=splats) == 0
     assert "held out" in capsys.readouterr().out
     slices = read_volume(out / "slices")
     metrics = json.loads((out / "metrics.json").read_text())

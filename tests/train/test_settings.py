@@ -102,7 +102,7 @@ def test_positions_learn_slower_in_longer_runs():
     # What they add up to does not grow with the steps: that lost fits of 30,000.
     assert rates.first_means(2000) * 2000 == pytest.approx(500 * 1e-3)
     assert LearningRates(means=1e-3, means_steps=0).first_means(30_000) == 1e-3
-    for kind, wanted in ((TrainSettings, 6.4e-5), (XrayTrainSettings, 6e-4)):
+    for kind, wanted in ((TrainSettings, 6.4e-5), (XrayTrainSettings, 3e-4)):
         first = LearningRateSchedule(kind(steps=30_000), extent=2.0).learning_rates(0)["means"]
         assert first == pytest.approx(2 * wanted)
 

@@ -27,13 +27,13 @@ X = TypeVar("X", bound="XrayTrainSettings")
 class XrayLearningRates(LearningRates):
     """Adam's learning rates of densities at the first step; 0 = not trained."""
 
-    # The start is near already, so that positions may move fast and need not slow down by much.
-    means: float = 6e-4
+    # The start is near already, so that positions need not slow down by much.
+    means: float = 3e-4
     means_steps: int = 0
     means_last: float = 0.1
     quats: float = 2e-2
     log_scales: float = 2e-2
-    logits: float = 4e-2
+    logits: float = 2e-2
     sh: NoOption[float] = 0.0
     sh_rest: NoOption[float] = 0.2
     poses: NoOption[float] = 1e-3
