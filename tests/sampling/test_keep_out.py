@@ -91,8 +91,8 @@ def test_beside_a_body_a_ball_about_the_target_is_seen_whole(seed):
         here, slope = body.clearance(place[None], center, 1.0)
         ends = [body.clearance((place + h * way)[None], center, 1.0)[0][0] for h in (1e-6, -1e-6)]
         rise, fall = (ends[0] - here[0]) / 1e-6, (here[0] - ends[1]) / 1e-6
-        # But for edges, where the nearest place jumps.
-        if abs(rise - fall) < 1e-4:
+        # But for edges, where the nearest place jumps; of lines through the body nobody asks.
+        if here[0] > 1e-3 and abs(rise - fall) < 1e-4:
             assert slope[0] @ way == pytest.approx(rise, abs=1e-3)
 
 

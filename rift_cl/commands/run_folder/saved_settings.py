@@ -186,7 +186,7 @@ def digest_of(values: Any) -> str:
     """A digest of settings, as ``config.json`` holds them."""
     from rift_cl.io.output import json_text
 
-    return hashlib.sha256(json_text(values).encode()).hexdigest()[:16]
+    return hashlib.sha256(json_text(values).encode(errors="surrogatepass")).hexdigest()[:16]
 
 
 def asked_before(settings: Any) -> dict[str, Any] | None:
