@@ -7,6 +7,7 @@ import pytest
 
 import rift_cl as rift
 from rift_cl.commands.cli import main
+from rift_cl.commands.run_folder.saved_settings import changes_a_run
 from rift_cl.io import read_volume
 from rift_cl.phantom import Ellipsoid
 
@@ -120,6 +121,22 @@ def test_in_python_too_and_of_a_file_that_was_edited(in_millimetres, scan, tmp_p
     given["config"].write_text(json.dumps(record))
     found = rift.reconstruct_scan(scan.integrals, tmp_path / "edited", filter="hann", **given)
     assert (found.settings.size, found.settings.filter) == (40, "hann")
+
+
+@pytest.mark.parametrize(
+    ("words", "changes"),
+    [
+        ("--config c.json --out x --overwrite", False),
+        ("--config=c.json --no-overwrite --device cpu --preview", False),
+        ("--config c.json --binning 2", True),
+        ("other.h5 --config c.json", True),
+        ("--config c.json other.h5", True),
+        ("--config c.json --overwrite other.h5", True),
+        ("--config c.json --preview other.h5", True),
+    ],
+)
+def test_what_changes_a_run_is_told_from_where_it_is_left(words, changes):
+    assert changes_a_run(words.split()) == changes
 
 
 def test_steps_are_recorded(scan, tmp_path):

@@ -14,7 +14,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import replace
-from typing import Any, Literal, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,6 +26,7 @@ from rift_cl.geometry import Camera
 from rift_cl.io.captures.capture import View, camera_at, read_known_view
 from rift_cl.io.images.display_light import to_display
 from rift_cl.io.images.picture_header import read_picture_header
+from rift_cl.io.scenes.scene_drawing import Light
 
 # Share of the free host memory that photographs may take, and of the memory budget of a device that
 # computes in the host's memory.
@@ -42,7 +43,6 @@ _EXACT = 1e-3
 
 Floats = NDArray[np.float32]
 Kept = NDArray[Any]
-Light = Literal["display", "linear"]
 
 
 class _Photograph(NamedTuple):

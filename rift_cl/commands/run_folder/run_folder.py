@@ -30,6 +30,7 @@ from rift_cl.commands.run_folder.saved_settings import (
     digest_of,
     options_of,
     record_of,
+    whole_paths,
 )
 from rift_cl.errors import CheckpointError, InputError, OutputError
 from rift_cl.io.folder_lock import LOCK_NAME, keep, let_go
@@ -427,17 +428,10 @@ def _changed(settings: Any) -> dict[str, Any]:
     if before is not None:
         return before
     return {
-        option.name: _whole(option.value)
+        option.name: whole_paths(option.value)
         for option in options_of(settings)
         if option.value != option.default
     }
-
-
-def _whole(value: Any) -> Any:
-    """A value with every path from the root, since a run is gone on with from anywhere."""
-    if isinstance(value, Path):
-        return value.absolute()
-    return tuple(map(_whole, value)) if isinstance(value, tuple) else value
 
 
 def _alike(one: Any, other: Any) -> bool:

@@ -32,7 +32,7 @@ _NOT_REPEATED = (
 )
 # Those that leave what is repeated as it was, and words of a command line with no value after them.
 _FREE = (*_NOT_REPEATED, "device", "memory", "out", "quiet")
-_SWITCHES = ("dry_run", "overwrite", "quiet", "resume", "view")
+_SWITCHES = ("dry_run", "overwrite", "preview", "quiet", "resume", "view")
 
 # Of config.json: what --load ran, by name, with hashes; the options that were given; and a digest
 # of the settings, which tells whether they were edited since.
@@ -208,7 +208,8 @@ def asked_before(settings: Any) -> dict[str, Any] | None:
 def differing(one: Any, other: Any) -> list[str]:
     """The names of options that decide what comes out, and whose values in two trees differ."""
     values, others = (
-        {option.name: _whole(option.value) for option in options_of(tree)} for tree in (one, other)
+        {option.name: whole_paths(option.value) for option in options_of(tree)}
+        for tree in (one, other)
     )
     return [
         name
@@ -217,10 +218,11 @@ def differing(one: Any, other: Any) -> list[str]:
     ]
 
 
-def _whole(value: Any) -> Any:
+def whole_paths(value: Any) -> Any:
+    """A value with every path from the root, since a run is repeated from anywhere."""
     if isinstance(value, Path):
         return value.absolute()
-    return tuple(map(_whole, value)) if isinstance(value, tuple) else value
+    return tuple(map(whole_paths, value)) if isinstance(value, tuple) else value
 
 
 def _doubt_parts(before: Any, path: Path) -> None:
