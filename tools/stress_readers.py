@@ -202,6 +202,9 @@ def _outcome(how: str, path: Path) -> tuple[str, str]:
         wrong = _READ[how](path)
         return ("unnamed error", wrong) if wrong else ("read", "")
     except RiftError as error:
+        # A picture's dies in a child, and is told by name; it is a crash all the same.
+        if "the decoder " in str(error):
+            return "crash", str(error)
         named = str(path.parent) in str(error)
         return (
             (type(error).__name__, "") if named else ("unnamed error", f"{error!r} names no file")

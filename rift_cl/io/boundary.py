@@ -18,7 +18,7 @@ from rift_cl.errors import DTypeError, FileFormatError, InputError, ResourceLimi
 
 HOW_TO_NAME = "name those that are meant with dataset= and theta= (--dataset, --theta)"
 
-_HOST_SHARE = 0.6
+HOST_SHARE = 0.6
 _REASON_LENGTH = 200
 
 
@@ -86,7 +86,7 @@ def check_numeric(path: Path, name: str, dtype: np.dtype[np.generic]) -> None:
 
 def _available() -> int | None:
     free = free_host_memory()
-    return None if free is None else int(_HOST_SHARE * free)
+    return None if free is None else int(HOST_SHARE * free)
 
 
 def _reason(error: Exception) -> str:

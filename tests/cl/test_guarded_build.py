@@ -21,7 +21,7 @@ REQUEST = Request("0:0", "device", "probe", "source", ["-w"])
 # A child that answers with what it was asked, unless the first lines here make an end of it.
 ANSWERS = """
 import os, signal, sys, time
-from rift_cl.cl.build.worker import read_message, write_message
+from rift_cl.child_process import read_message, write_message
 while (asked := read_message(sys.stdin.buffer)) is not None:
     request = asked[0]
     {fate}
@@ -65,7 +65,7 @@ def test_child_whose_process_is_killed_leaves_nothing_behind(python, tmp_path):
         "from rift_cl.cl.build.guarded_build import Worker\n"
         "import os, signal\n"
         "worker = Worker()\n"
-        "worker.ask({'selector': 'none'})\n"
+        "worker.answer({'selector': 'none'})\n"
         "print(worker._scratch, flush=True)\n"
         "os.kill(os.getpid(), signal.SIGKILL)\n",
         TMPDIR=str(tmp_path),

@@ -13,7 +13,7 @@ from PIL import Image, ImageCms
 from view_files import store
 
 from rift_cl.io import open_capture
-from rift_cl.io.images.picture_header import read_picture_header
+from rift_cl.io.images.read_picture import read_picture_header
 
 
 def note(path: Path) -> str:

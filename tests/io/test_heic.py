@@ -20,7 +20,7 @@ from rift_cl.io import (
     read_image,
     read_view,
 )
-from rift_cl.io.images.picture_header import read_picture_header
+from rift_cl.io.images.read_picture import read_picture_header
 
 
 @pytest.fixture

@@ -14,7 +14,7 @@ from view_files import K, store, view_of
 from rift_cl.errors import ShapeError
 from rift_cl.geometry.camera import Camera
 from rift_cl.io import View, read_image, read_view
-from rift_cl.io.images.picture_header import read_picture_header
+from rift_cl.io.images.read_picture import read_picture_header
 
 HEIGHT, WIDTH = 48, 64
 TYPES = ["jpg", "png", "tif"]

@@ -26,7 +26,7 @@ from rift_cl.io import (
     pose_photographs,
     read_image,
 )
-from rift_cl.io.images.picture_header import read_picture_header
+from rift_cl.io.images.read_picture import read_picture_header
 from rift_cl.progress import Report
 
 

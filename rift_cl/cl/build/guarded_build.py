@@ -11,37 +11,29 @@ that somebody ended, or that had no memory, is no verdict on its compiler, and i
 
 from __future__ import annotations
 
-import atexit
-import contextlib
-import os
 import shutil
-import signal
-import subprocess
-import sys
 import tempfile
-import threading
 import time
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from rift_cl.child_process import HUNG, Buffer, ChildProcess
 from rift_cl.cl.build.cache_check import program_files
 from rift_cl.cl.build.first_launch import FirstLaunch, without_numbers
 from rift_cl.cl.build.intel_runtime import renew_intel_runtime
 from rift_cl.cl.build.kernel_cache import LEAST_ROOM, cache_folder, room
 from rift_cl.cl.build.program_store import write_whole
-from rift_cl.cl.build.worker import SCRATCH, read_message, write_message
+from rift_cl.cl.build.worker import SCRATCH
 from rift_cl.errors import DeviceError
 
 # Seconds after which a compiler that is asked for the first time counts as hanging; and the least.
 LIMIT, _LEAST = 300.0, 1.0
-# Seconds that a child whose pipe broke is given to be gone.
-_DYING = 20.0
 # Others end a child in these ways, as the system does where memory runs out; no compiler by itself.
 _ENDED = ("SIGKILL", "SIGTERM", "SIGINT", "SIGHUP")
 # Seconds that repeated launches may take: all that they wait for is the compiler.
 _LONGEST_LAUNCHES = 120.0
-_HUNG, _FULL = "hung", "is full"
+_FULL = "is full"
 UNOPTIMIZED = "-cl-opt-disable"
 # How a kernel is built: what stands before its source, and further options.
 WAYS = {
@@ -114,7 +106,7 @@ def guarded_build(request: Request, worker: Worker | None = None) -> Built:
         asked = request._replace(source=source, options=options)
         fault, answer, binary = _answer(asked, worker, until)
         if answer is not None and "error" not in answer:
-            return Built(binary, way, first, log, passing)
+            return Built(bytes(binary), way, first, log, passing)
         said = "" if answer is None else answer["error"]
         short = answer is not None and answer.get("short of memory", False)
         passing |= short or _is_passing(fault)
@@ -139,7 +131,7 @@ def guarded_launch(request: Request) -> str:
     """
     worker = _worker_of(request.selector)
     fault, _, _ = _answer(request, worker, time.monotonic() + _LONGEST_LAUNCHES)
-    return "" if _is_passing(fault) or _HUNG in fault else fault
+    return "" if _is_passing(fault) or HUNG in fault else fault
 
 
 def _is_passing(fault: str) -> bool:
@@ -149,18 +141,18 @@ def _is_passing(fault: str) -> bool:
 
 def _answer(
     request: Request, worker: Worker, until: float
-) -> tuple[str, dict[str, Any] | None, bytes]:
+) -> tuple[str, dict[str, Any] | None, Buffer]:
     """What a child makes of a request, which half of the time ``until`` is left for; see ``ask``.
 
     A compiler dies of a launch whatever its numbers are. The kernel itself may die of what does not
     fit together, as numbers and the zeros of its buffers do, or of numbers that are all zero; so
     that a launch which passes in one of these ways has been compiled.
     """
-    found: tuple[str, dict[str, Any] | None, bytes] = ("", None, b"")
+    found: tuple[str, dict[str, Any] | None, Buffer] = ("", None, b"")
     tries = [request.launches, list(map(without_numbers, request.launches))]
     for launches in tries if request.launches else [()]:
         asked = request._replace(launches=launches)._asdict()
-        found = worker.ask(asked, _half_of_what_is_left(until))
+        found = worker.answer(asked, _half_of_what_is_left(until))
         if not found[0]:
             break
     answer = found[1]
@@ -173,8 +165,8 @@ def _half_of_what_is_left(until: float) -> float:
     return max((until - time.monotonic()) / 2, _LEAST)
 
 
-class Worker:
-    """A child process that compiles.
+class Worker(ChildProcess):
+    """A child process that compiles, with a cache of its driver's own.
 
     Args:
         command: what to start; our own worker if not given.
@@ -182,56 +174,31 @@ class Worker:
     """
 
     def __init__(self, command: list[str] | None = None, limit: float = LIMIT) -> None:
-        self._command = command or [sys.executable, "-m", "rift_cl.cl.build.worker"]
-        self.limit = limit
-        self._process: subprocess.Popen[bytes] | None = None
+        super().__init__(
+            "rift_cl.cl.build.worker", who="its compiler", limit=limit, command=command
+        )
         self._scratch: str | None = None
-        self._asking = threading.Lock()
 
-    def ask(
+    def answer(
         self, request: dict[str, Any], limit: float | None = None
-    ) -> tuple[str, dict[str, Any] | None, bytes]:
-        """Have a request answered, within ``limit`` seconds in place of the child's own.
-
-        A child that dies after other work may die of that, such as of a kernel that wrote where it
-        must not: a fresh one is asked again.
-
-        Returns:
-            What went wrong with the child, empty if nothing; its answer, or None; and the bytes
-            that came with it.
+    ) -> tuple[str, dict[str, Any] | None, Buffer]:
+        """Have a request answered; see ``ask``.
 
         Raises:
             DeviceError: no child can be started.
         """
         renew_intel_runtime()
-        limit = self.limit if limit is None else limit
-        with self._asking:
-            fresh = self._process is None
-            found = self._ask(request, limit)
-            if not found[0] or fresh or _HUNG in found[0]:
-                return found
-            return self._ask(request, limit)
-
-    def _ask(
-        self, request: dict[str, Any], limit: float
-    ) -> tuple[str, dict[str, Any] | None, bytes]:
-        process = self._started()
-        found: list[tuple[dict[str, Any], bytes]] = []
-        talk = threading.Thread(target=_talk, args=(process, request, found), daemon=True)
-        talk.start()
         try:
-            talk.join(limit)
-        except BaseException:
-            self._end(process, 0)
-            raise
-        if found:
-            return "", *found[0]
-        if talk.is_alive():
-            self._end(process, 0)
-            return f"its compiler {_HUNG} for {limit:.3g} s", None, b""
+            fault, answer, data = self.ask(request, limit)
+        except OSError as error:
+            raise DeviceError(
+                f"the process that compiles kernels cannot be started ({error}): it is Python "
+                "itself, and wants memory and the right to start processes"
+            ) from error
         place = tempfile.gettempdir()
-        full = f": {place} {_FULL}" if room(Path(place)) < LEAST_ROOM else ""
-        return death_of("its compiler", self._end(process, _DYING)) + full, None, b""
+        if fault and HUNG not in fault and room(Path(place)) < LEAST_ROOM:
+            fault += f": {place} {_FULL}"
+        return fault, answer, data
 
     def hand_over(self) -> None:
         """Put what the child's driver has compiled into our cache; hold the kernel's lock.
@@ -252,77 +219,16 @@ class Worker:
                 "or set RIFT_CACHE_DIR to another folder that you own"
             ) from error
 
-    def close(self) -> None:
-        """End the child."""
-        if self._process is not None:
-            self._end(self._process, 0)
+    def environment(self) -> dict[str, str]:
+        """Where the child's driver keeps what it compiles."""
+        place = self._scratch = tempfile.mkdtemp(prefix="rift-cl-compiler-")
+        return {"POCL_CACHE_DIR": place, SCRATCH: place}
 
-    def _started(self) -> subprocess.Popen[bytes]:
-        if self._process is None:
-            root = str(Path(__file__).parents[3])
-            path = os.pathsep.join(filter(None, (root, os.environ.get("PYTHONPATH"))))
-            try:
-                place = self._scratch = tempfile.mkdtemp(prefix="rift-cl-compiler-")
-                own = {"PYTHONPATH": path, "POCL_CACHE_DIR": place, SCRATCH: place}
-                self._process = subprocess.Popen(
-                    self._command,
-                    stdin=subprocess.PIPE,
-                    stdout=subprocess.PIPE,
-                    stderr=subprocess.DEVNULL,
-                    env={**os.environ, **own},
-                )
-            except OSError as error:
-                self._clean()
-                raise DeviceError(
-                    f"the process that compiles kernels cannot be started ({error}): it is Python "
-                    "itself, and wants memory and the right to start processes"
-                ) from error
-        return self._process
-
-    def _end(self, process: subprocess.Popen[bytes], patience: float) -> int:
-        """Kill the child where it has not ended by itself, and return its exit status."""
-        self._process = None
-        try:
-            status = process.wait(patience)
-        except subprocess.TimeoutExpired:
-            process.kill()
-            status = process.wait()
-        for pipe in (process.stdin, process.stdout):
-            if pipe is not None:
-                # What was not sent to a dead child is of no use.
-                with contextlib.suppress(OSError):
-                    pipe.close()
-        self._clean()
-        return status
-
-    def _clean(self) -> None:
+    def ended(self) -> None:
+        """Remove what the child's driver kept."""
         if self._scratch is not None:
             shutil.rmtree(self._scratch, ignore_errors=True)
             self._scratch = None
-
-
-def _talk(
-    process: subprocess.Popen[bytes],
-    request: dict[str, Any],
-    found: list[tuple[dict[str, Any], bytes]],
-) -> None:
-    assert process.stdin is not None
-    assert process.stdout is not None
-    try:
-        write_message(process.stdin, request)
-        answer = read_message(process.stdout)
-    except (OSError, ValueError):
-        # The child died, or was ended, while it was spoken to.
-        return
-    if answer is not None:
-        found.append(answer)
-
-
-def death_of(who: str, status: int) -> str:
-    """How a process ended that should not have, from its exit status."""
-    if status < 0:
-        return f"{who} died ({signal.Signals(-status).name})"
-    return f"{who} ended the process (status {status})"
 
 
 _workers: dict[str, Worker] = {}
@@ -330,6 +236,5 @@ _workers: dict[str, Worker] = {}
 
 def _worker_of(selector: str) -> Worker:
     if selector not in _workers:
-        worker = _workers[selector] = Worker()
-        atexit.register(worker.close)
+        _workers[selector] = Worker()
     return _workers[selector]

@@ -20,13 +20,14 @@ from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import IO, Any
 
+from rift_cl.child_process import death_of
 from rift_cl.cl.build.driver_record import (
     OTHER_KIND,
     add_to_record,
     forget_record,
     read_record,
 )
-from rift_cl.cl.build.guarded_build import WAYS, death_of
+from rift_cl.cl.build.guarded_build import WAYS
 from rift_cl.cl.build.kernel_features import feature_of
 from rift_cl.cl.build.program_store import forget, is_settled, stored_programs
 from rift_cl.cl.device import Device

@@ -25,7 +25,7 @@ from rift_cl.commands.pictures.evenly_spaced import evenly
 from rift_cl.geometry import Camera
 from rift_cl.io.captures.capture import View, camera_at, read_known_view
 from rift_cl.io.images.display_light import to_display
-from rift_cl.io.images.picture_header import read_picture_header
+from rift_cl.io.images.read_picture import read_picture_header
 from rift_cl.io.scenes.scene_drawing import Light
 
 # Share of the free host memory that photographs may take, and of the memory budget of a device that

@@ -15,7 +15,8 @@ from rift_cl.errors import RiftError
 from rift_cl.io.captures.capture_paths import MASK_FOLDERS, CaptureFolder, masks_named
 from rift_cl.io.captures.photograph_folder import photograph_names
 from rift_cl.io.captures.view import View
-from rift_cl.io.images.picture_header import PictureHeader, read_picture_header
+from rift_cl.io.images.picture_header import PictureHeader
+from rift_cl.io.images.read_picture import read_picture_header
 
 # What lies beside the training file of NeRF's synthetic scenes.
 _SCORED = ("transforms_val.json", "transforms_test.json")

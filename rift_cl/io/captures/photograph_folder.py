@@ -21,8 +21,10 @@ from rift_cl.io.boundary import check_claim, reading
 from rift_cl.io.captures.capture_paths import CaptureFolder, mask_beside, mask_of
 from rift_cl.io.captures.view_image import check_colors, read_photograph, upright
 from rift_cl.io.images.display_light import to_display
-from rift_cl.io.images.picture_header import PictureHeader, read_picture_header
-from rift_cl.io.images.pixels import SUFFIXES, write_pixels
+from rift_cl.io.images.image_format import SUFFIXES
+from rift_cl.io.images.picture_header import PictureHeader
+from rift_cl.io.images.pixels import write_pixels
+from rift_cl.io.images.read_picture import read_picture_header
 from rift_cl.io.output import check_space, writing
 from rift_cl.progress import Report
 

@@ -26,7 +26,7 @@ from rift_cl.io.captures.photograph_folder import (
 )
 from rift_cl.io.captures.pose_record import POSE_RECORD
 from rift_cl.io.images.heic import check_heic
-from rift_cl.io.images.pixels import HEIC, SUFFIXES
+from rift_cl.io.images.image_format import HEIC, SUFFIXES
 from rift_cl.io.json_fields import read_json_object
 from rift_cl.io.output import make_folder, staged_folder, write_json, writing
 from rift_cl.progress import Report

@@ -25,7 +25,7 @@ from rift_cl.io.captures.point_cloud import read_point_cloud
 from rift_cl.io.captures.poses import view_of_opengl
 from rift_cl.io.captures.split_lists import split_by_lists
 from rift_cl.io.captures.view import Capture, View, check_views, located
-from rift_cl.io.images.picture_header import read_picture_header
+from rift_cl.io.images.read_picture import read_picture_header
 from rift_cl.io.json_fields import Fields, read_json_object
 
 _COEFFICIENTS = tuple(dict.fromkeys(name for names in LENS_MODELS.values() for name in names))

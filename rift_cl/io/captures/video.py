@@ -4,14 +4,14 @@ A hand that walks round something blurs most frames a little and some not at all
 into stretches of equal length, one for each frame that is wanted, and of each the frame whose
 Laplacian varies most is kept (Pech-Pacheco et al. 2000): frames are evenly spaced, and sharp.
 
-PyAV decodes, in the wheels of which FFmpeg comes along; it is an extra.
+PyAV decodes, in a child process (``video_frames``).
 """
 
 from __future__ import annotations
 
 import os
 from collections.abc import Generator, Iterator
-from contextlib import contextmanager
+from contextlib import closing
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
@@ -19,8 +19,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rift_cl.errors import FileFormatError, InputError, RiftError
-from rift_cl.io.boundary import check_claim, reading
+from rift_cl.errors import InputError, RiftError
+from rift_cl.io.decoder import Decoder
 from rift_cl.io.images.pixels import write_pixels
 from rift_cl.io.json_fields import read_json_object
 from rift_cl.io.output import make_folder, staged_folder, write_json, writing
@@ -28,10 +28,8 @@ from rift_cl.progress import Report
 
 VIDEOS = (".mp4", ".mov", ".m4v", ".webm", ".mkv", ".avi")
 _RECORD = "frames.json"
-# Sharpness is judged on pictures so wide: finer than that it is noise.
-_JUDGED = 480
-# Curves of high dynamic range, by their numbers in ITU-T H.273.
-_HDR = {16: "PQ", 18: "HLG"}
+# Bytes that a frame has at most: eight times as wide and high as 8K.
+_LARGEST = 1 << 33
 _JPEG = {"Compression": "jpeg:95", "jpeg:subsampling": "4:4:4"}
 
 
@@ -52,8 +50,7 @@ def check_video(path: Path) -> None:
         InputError: PyAV is not installed, or there are no pictures in the file.
         FileFormatError: the file is damaged.
     """
-    with _stream(path):
-        pass
+    video_notes(path)
 
 
 def video_notes(path: Path) -> list[str]:
@@ -62,21 +59,17 @@ def video_notes(path: Path) -> list[str]:
     Raises:
         RiftError: see ``check_video``.
     """
-    with _stream(path) as (_, stream):
-        curve = _HDR.get(int(stream.codec_context.color_trc))
-        aspect = stream.sample_aspect_ratio or 1
-    notes = []
-    if curve:
-        notes.append(
-            f"the video has high dynamic range ({curve}), which is not undone: colours come out "
-            "pale, so that a recording without it (SDR) serves better"
+    _check_installed(path)
+    with closing(Decoder()) as decoder:
+        return list(map(str, decoder.decode(path, "video notes")[0]["notes"]))
+
+
+def _check_installed(path: Path) -> None:
+    if find_spec("av") is None:
+        raise InputError(
+            f"{path}: videos are read by PyAV, which is not installed: pip install av (or "
+            "'.[film]' where the source is), or give a folder of its frames"
         )
-    if aspect != 1:
-        notes.append(
-            f"the video's pixels are {float(aspect):.3g} times as wide as high and are taken for "
-            "squares, which poses suffer from: make them square first"
-        )
-    return notes
 
 
 def sharpest_frames(
@@ -104,14 +97,24 @@ def sharpest_frames(
     earlier = _earlier(folder, order)
     if earlier is not None:
         return earlier
-    total = _length(path)
+    _check_installed(path)
+    # A child of its own: it keeps its place in the video from one stretch to the next.
+    with closing(Decoder()) as decoder:
+        return (yield from _taken(decoder, path, folder, order))
+
+
+def _taken(
+    decoder: Decoder, path: Path, folder: Path, order: dict[str, Any]
+) -> Generator[Report, None, tuple[int, int]]:
+    """Have the frames decoded and written; see ``sharpest_frames``."""
+    total = int(decoder.decode(path, "video length")[0]["frames"])
     if not total:
         raise InputError(f"{path}: the video holds no frames")
-    wanted = min(count, total)
+    wanted = min(int(order["frames"]), total)
     make_folder(folder.parent)
     with staged_folder(folder, _strange) as part:
         taken = 0
-        for taken, best in enumerate(_best_frames(path, total, wanted), 1):
+        for taken, best in enumerate(_best_frames(decoder, path, total, wanted), 1):
             with writing(part):
                 write_pixels(part / f"{taken:05}.jpg", best, format="jpeg", attributes=dict(_JPEG))
             yield Report(taken, wanted, "frames of the video taken")
@@ -121,82 +124,16 @@ def sharpest_frames(
     return taken, total
 
 
-def _best_frames(path: Path, total: int, wanted: int) -> Iterator[NDArray[np.uint8]]:
-    """(y, x, 3) the sharpest frame of each stretch."""
-    best, sharpest, stretch = None, -1.0, 0
-    for number, frame in enumerate(_frames(path)):
-        now = min(number * wanted // total, wanted - 1)
-        if now != stretch and best is not None:
-            yield _upright(path, best)
-            best, sharpest = None, -1.0
-        stretch, sharp = now, _sharpness(path, frame)
-        if sharp > sharpest:
-            best, sharpest = frame, sharp
-    if best is not None:
-        yield _upright(path, best)
-
-
-def _frames(path: Path) -> Iterator[Any]:
-    with _stream(path) as (container, stream):
-        stream.thread_type = "AUTO"
-        frames = container.decode(stream)
-        while True:
-            with reading(path, "the video"):
-                frame = next(frames, None)
-            if frame is None:
-                return
-            yield frame
-
-
-def _length(path: Path) -> int:
-    """Frames in a video, counted: what headers claim is often missing."""
-    with _stream(path) as (container, stream), reading(path, "the video"):
-        return sum(1 for packet in container.demux(stream) if packet.size)
-
-
-@contextmanager
-def _stream(path: Path) -> Iterator[tuple[Any, Any]]:
-    """The file, and the pictures in it."""
-    if find_spec("av") is None:
-        raise InputError(
-            f"{path}: videos are read by PyAV, which is not installed: pip install av (or "
-            "'.[film]' where the source is), or give a folder of its frames"
+def _best_frames(
+    decoder: Decoder, path: Path, total: int, wanted: int
+) -> Iterator[NDArray[np.uint8]]:
+    """(y, x, 3) the sharpest frame of each stretch that has any."""
+    for number in range(wanted):
+        answer, codes = decoder.decode(
+            path, "video frame", _LARGEST, number=number, frames=total, stretches=wanted
         )
-    import av
-
-    with reading(path, "the video"):
-        container = av.open(str(path))
-    with container:
-        if not container.streams.video:
-            raise InputError(f"{path}: the video holds no pictures")
-        stream = container.streams.video[0]
-        if stream.codec_context is None:
-            raise FileFormatError(f"{path}: no decoder is known for the video's pictures")
-        if not (stream.width and stream.height):
-            raise FileFormatError(f"{path}: the video does not say how large its pictures are")
-        check_claim(path, "a frame", 12 * stream.width * stream.height, None)
-        yield container, stream
-
-
-def _sharpness(path: Path, frame: Any) -> float:
-    """Variance of the Laplacian of a frame, grey and made small."""
-    width = min(_JUDGED, frame.width)
-    height = max(1, frame.height * width // frame.width)
-    with reading(path, "the video"):
-        small = frame.reformat(width, height, format="gray", interpolation="AREA")
-        grey = small.to_ndarray().astype(np.float32)
-    if min(grey.shape) < 3:
-        return 0.0
-    inner = grey[1:-1, 1:-1]
-    around = grey[:-2, 1:-1] + grey[2:, 1:-1] + grey[1:-1, :-2] + grey[1:-1, 2:]
-    return float(np.var(around - 4 * inner))
-
-
-def _upright(path: Path, frame: Any) -> NDArray[np.uint8]:
-    """The frame's colours, turned as the file says that it is shown."""
-    with reading(path, "the video"):
-        codes = frame.to_ndarray(format="rgb24")
-    return np.ascontiguousarray(np.rot90(codes, round(frame.rotation / 90)))
+        if "shape" in answer:
+            yield np.frombuffer(codes, np.uint8).reshape(answer["shape"])
 
 
 def _earlier(folder: Path, order: dict[str, Any]) -> tuple[int, int] | None:

@@ -17,8 +17,8 @@ from rift_cl.errors import FileFormatError, InputError, NonFiniteError, ShapeErr
 from rift_cl.io.boundary import check_claim
 from rift_cl.io.captures.view import View, camera_at
 from rift_cl.io.images.display_light import to_display, to_linear
-from rift_cl.io.images.picture_header import PictureHeader, read_picture_header
-from rift_cl.io.images.pixels import read_pixels
+from rift_cl.io.images.picture_header import PictureHeader
+from rift_cl.io.images.read_picture import read_picture_header, read_pixels
 from rift_cl.io.images.resample import shrunk, undistorted
 
 Image = NDArray[np.float32]

@@ -21,8 +21,6 @@ from numpy.typing import NDArray
 
 from rift_cl.errors import FileFormatError, InputError
 
-# Brands of pictures that are coded in HEVC, which is what libheif decodes there.
-BRANDS = (b"heic", b"heix", b"heim", b"heis", b"mif1")
 # EXIF's numbers of the maker, the model, its own folder of facts, and the focal lengths in there.
 _MAKE, _MODEL, _EXIF, _FOCALS = 271, 272, 0x8769, (0x920A, 0xA405)
 # What a colour profile is called that has no name.

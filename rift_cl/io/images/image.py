@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rift_cl.errors import DTypeError, InputError, NonFiniteError, ShapeError
-from rift_cl.io.images.pixels import read_pixels, write_pixels
+from rift_cl.io.images.pixels import write_pixels
+from rift_cl.io.images.read_picture import read_pixels
 from rift_cl.io.output import atomic_path
 
 _CHANNELS = (1, 3, 4)

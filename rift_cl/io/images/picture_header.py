@@ -8,7 +8,8 @@ from typing import Any
 
 from rift_cl.io.boundary import reading
 from rift_cl.io.images.heic import UNNAMED, heic_profile, heic_taken_by, opened_heic
-from rift_cl.io.images.pixels import HEIC, image_format, opened_image
+from rift_cl.io.images.image_format import HEIC
+from rift_cl.io.images.pixels import opened_image
 
 # Beginnings of OpenImageIO's names for the curve and the primaries of sRGB, or nearly them.
 _SRGB = ("srgb_rec709", "g22_rec709", "gamma2.2")
@@ -58,15 +59,13 @@ class PictureHeader:
         return (self.size[1], self.size[0]) if self.sideways else self.size
 
 
-def read_picture_header(path: Path) -> PictureHeader:
-    """Read the header of a PNG, OpenEXR, TIFF, JPEG, HDR or HEIC.
+def decode_header(path: Path, format: str) -> PictureHeader:
+    """Read the header of a picture.
 
     Raises:
-        InputError: there is no such file, or pi-heif is wanted and not installed.
-        FileFormatError: the file is damaged, or is none of these.
+        FileFormatError: the file is damaged.
     """
     with reading(path, "the image"):
-        format = image_format(path)
         return _heic_header(path) if format == HEIC else _header(path, format)
 
 

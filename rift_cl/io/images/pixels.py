@@ -3,7 +3,8 @@
 OpenImageIO reports failure by return values, and for some formats by ``geterror`` alone: a PNG on
 a full disk counts as written otherwise. On the way in it would try every decoder it has on a file
 that the first one refuses, so the few formats wanted here are recognised before it is asked. HEIC,
-which its wheels lack, goes through pi-heif.
+which its wheels lack, goes through pi-heif. Pictures are read here in a child process alone
+(``read_picture``).
 """
 
 from __future__ import annotations
@@ -20,31 +21,8 @@ from numpy.typing import NDArray
 
 from rift_cl.errors import FileFormatError, InputError, ResourceLimitError
 from rift_cl.io.boundary import check_claim, reading
-from rift_cl.io.images.heic import BRANDS, heic_codes, opened_heic
-
-HEIC = "heic"
-SUFFIXES = {
-    ".png": "png",
-    ".exr": "openexr",
-    ".tif": "tiff",
-    ".tiff": "tiff",
-    ".jpg": "jpeg",
-    ".jpeg": "jpeg",
-    ".hdr": "hdr",
-    ".heic": HEIC,
-    ".heif": HEIC,
-}
-_SIGNATURES = {
-    b"\x89PNG\r\n\x1a\n": "png",
-    b"\x76\x2f\x31\x01": "openexr",
-    b"II*\0": "tiff",
-    b"MM\0*": "tiff",
-    b"II+\0": "tiff",
-    b"MM\0+": "tiff",
-    b"\xff\xd8\xff": "jpeg",
-    b"#?RADIANCE": "hdr",
-    b"#?RGBE": "hdr",
-}
+from rift_cl.io.images.heic import heic_codes, opened_heic
+from rift_cl.io.images.image_format import HEIC
 
 
 def write_pixels(
@@ -75,7 +53,7 @@ def write_pixels(
         raise OSError(message or "OpenImageIO gives no reason")
 
 
-def read_pixels(path: Path, *, budget: int | None = None) -> NDArray[np.float32]:
+def decode_pixels(path: Path, format: str, budget: int) -> NDArray[np.float32]:
     """Read (y, x, channel) as float32; integers are scaled to [0, 1], alpha is not multiplied in.
 
     OpenEXR and most TIFF hold colours with alpha multiplied in; they are divided by it, in the
@@ -85,24 +63,22 @@ def read_pixels(path: Path, *, budget: int | None = None) -> NDArray[np.float32]
     Rows and columns are those of the file: an EXIF orientation turns nothing (see ``read_view``).
 
     Raises:
-        InputError: there is no such file.
-        FileFormatError: the file is damaged, or is none of PNG, OpenEXR, TIFF, JPEG, HDR and HEIC.
+        FileFormatError: the file is damaged.
         ResourceLimitError: the image is larger than the budget; nothing was allocated.
     """
     with reading(path, "the image"):
-        format = image_format(path)
         return _heic(path, budget) if format == HEIC else _opened(path, format, budget)
 
 
-def _heic(path: Path, budget: int | None) -> NDArray[np.float32]:
+def _heic(path: Path, budget: int) -> NDArray[np.float32]:
     picture = opened_heic(path)
     width, height = picture.size
     check_claim(path, "the image", 5 * width * height * len(picture.mode), budget)
     return heic_codes(picture).astype(np.float32) / np.float32(255)
 
 
-def _opened(path: Path, format: str, budget: int | None) -> NDArray[np.float32]:
-    """The pixels of a file that OpenImageIO reads; see ``read_pixels``."""
+def _opened(path: Path, format: str, budget: int) -> NDArray[np.float32]:
+    """The pixels of a file that OpenImageIO reads; see ``decode_pixels``."""
     with opened_image(path, format) as source:
         spec = source.spec()
         if spec.deep or spec.depth > 1:
@@ -159,26 +135,6 @@ def _name(path: Path) -> str:
         raise InputError(
             f"{path}: the name of an image has to be UTF-8, which this is not: rename it"
         ) from error
-
-
-def image_format(path: Path) -> str:
-    """OpenImageIO's name for the format of a file, by its content.
-
-    Raises:
-        FileFormatError: content and name do not agree, or the format is not known.
-    """
-    with path.open("rb") as file:
-        start = file.read(16)
-    content = next((name for mark, name in _SIGNATURES.items() if start.startswith(mark)), None)
-    if start[4:8] == b"ftyp" and start[8:12] in BRANDS:
-        content = HEIC
-    if content is None or SUFFIXES.get(path.suffix.lower()) != content:
-        raise FileFormatError(
-            f"{path}: the content is {content or 'of no known format'}, the name says "
-            f"{path.suffix or 'nothing'}; an image is .png, .exr, .tif, .jpg, .hdr or .heic and "
-            "what its name says"
-        )
-    return content
 
 
 def _straight(pixels: NDArray[np.float32], spec: Any) -> NDArray[np.float32]:

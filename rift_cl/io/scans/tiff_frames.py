@@ -19,7 +19,8 @@ from numpy.typing import NDArray
 
 from rift_cl.errors import DTypeError, FileFormatError, ShapeError
 from rift_cl.io.boundary import check_claim, reading
-from rift_cl.io.images.pixels import first_line, image_format, opened_image
+from rift_cl.io.images.image_format import image_format
+from rift_cl.io.images.pixels import first_line, opened_image
 from rift_cl.io.scans.frame_stack import FrameStack
 from rift_cl.io.scans.scan_file import Frames, Part, ScanRows
 from rift_cl.io.scans.tiff_chain import TiffChain
