@@ -6,8 +6,8 @@ from types import SimpleNamespace
 
 import pytest
 
+from rift_cl.child_process import read_message, write_message
 from rift_cl.cl.build import cache_check, driver_record, program_store
-from rift_cl.cl.build.worker import read_message, write_message
 from rift_cl.commands.fit.kind import kind_of_fit
 from rift_cl.commands.sweep.one_run import is_done
 from rift_cl.commands.sweep.report import Row
