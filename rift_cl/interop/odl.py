@@ -4,11 +4,12 @@
 
     P = to_odl(A)                                     # between odl.rn spaces
     P = to_odl(A, domain=space)                       # from a uniform_discr, with its weights
-    D = from_odl(odl.PartialDerivative(space, axis=0), device=A.device)
+    D = from_odl(odl.Gradient(space), device=A.device)
 
 The spaces of functions that ODL discretizes weigh their inner products by the size of a cell, and
 ODL's adjoint goes by these. ``to_odl`` does as well; ``from_odl`` gives the transpose, without
-weights, as all of our operators have it.
+weights, as all of our operators have it. A power of a space, as gradients map to, is an array with
+one axis more, which comes first.
 """
 
 from __future__ import annotations
@@ -66,9 +67,11 @@ def from_odl(P: Any, *, device: Device | None = None) -> LinearOperator:
     """
     if not getattr(P, "is_linear", False) or not hasattr(P, "adjoint"):
         raise DTypeError(f"P is a {type(P).__name__}, wanted a linear operator of ODL")
-    spaces, product = (P.domain, P.range), optional_package("odl", what="from_odl").ProductSpace
-    if any(isinstance(space, product) or not hasattr(space, "dtype") for space in spaces):
-        raise DTypeError("P maps to or from a product of spaces, wanted arrays: take one of them")
+    spaces = (P.domain, P.range)
+    if not all(map(_is_array, spaces)):
+        raise DTypeError(
+            "P maps to or from a product of unlike spaces, wanted arrays: take one at a time"
+        )
     weights = [_weight(space) for space in spaces]
     # ODL's adjoint holds between weighted products: P* = (w_range / w_domain) P'.
     back = weights[0] / weights[1]
@@ -102,13 +105,24 @@ def _made(odl: Any, A: LinearOperator, domain: Any, range: Any, *, factor: float
     return Applied()
 
 
+def _is_array(space: Any) -> bool:
+    """Whether elements of a space are arrays: itself, or a power of one that is."""
+    product = optional_package("odl", what="from_odl").ProductSpace
+    if not isinstance(space, product):
+        return hasattr(space, "dtype")
+    return bool(len(space) and space.is_power_space and _is_array(space[0]))
+
+
 def _weight(space: Any) -> float:
     """The constant by which a space weighs its inner product."""
     weighting = getattr(space, "weighting", None)
     const = getattr(weighting, "const", getattr(weighting, "weight", 1.0))
-    if np.ndim(const):
-        raise DTypeError("a space has a weight for each sample, wanted one for all")
-    return float(const)
+    if np.ndim(const) or hasattr(weighting, "array"):
+        raise DTypeError("a space has a weight for each sample or part, wanted one for all")
+    if getattr(weighting, "exponent", 2.0) != 2.0:
+        raise DTypeError("a space has no inner product, wanted one with exponent 2")
+    parts = _weight(space[0]) if hasattr(space, "is_power_space") else 1.0
+    return float(const) * parts
 
 
 def _dtype(space: Any) -> np.dtype[Any]:

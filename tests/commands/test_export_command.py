@@ -168,3 +168,38 @@ def test_an_extension_of_no_format_is_told(here, arrays, capsys):
     said = " ".join(capsys.readouterr().err.split())
     assert "(--to)" in said and "render" not in said
     assert [entry.name for entry in here.iterdir()] == ["ball.ply"]
+
+
+@pytest.mark.parametrize("name", ["ply", "spz", "glb"])
+def test_a_scale_multiplies_every_length(name, here, arrays):
+    scene = SplatScene(**arrays)
+    scene.save(here / "ball.ply")
+    larger = SplatScene(
+        **{**arrays, "means": 4 * arrays["means"], "log_scales": arrays["log_scales"] + np.log(4)}
+    )
+    larger.save(here / "larger.ply")
+    suffix = FORMATS[name].suffix
+    assert export("ball.ply", "--to", name, "--out", f"a{suffix}", "--scale", 4) == 0
+    assert export("larger.ply", "--to", name, "--out", f"b{suffix}") == 0
+    if name == "ply":
+        found, wanted = SplatScene.load(here / "a.ply"), SplatScene.load(here / "b.ply")
+        np.testing.assert_allclose(found.means, wanted.means, rtol=1e-6)
+        np.testing.assert_allclose(found.log_scales, wanted.log_scales, rtol=1e-6)
+    else:
+        assert len((here / f"a{suffix}").read_bytes()) == len((here / f"b{suffix}").read_bytes())
+    if name == "glb":
+        # Positions are float32: a power of two changes none of their digits.
+        assert (here / "a.glb").read_bytes()[:400] == (here / "b.glb").read_bytes()[:400]
+
+
+@pytest.mark.parametrize("scale", ["0", "-1", "nan", "inf"])
+def test_a_scale_that_is_none_is_refused(scale, here, arrays, capsys):
+    SplatScene(**arrays).save(here / "ball.ply")
+    assert export("ball.ply", "--to", "spz", "--scale", scale) == 3
+    assert "--scale" in capsys.readouterr().err
+
+
+def test_a_page_has_no_scale(here, arrays, capsys):
+    SplatScene(**arrays).save(here / "ball.ply")
+    assert export("ball.ply", "--to", "html", "--scale", 2) == 3
+    assert "--scale" in capsys.readouterr().err

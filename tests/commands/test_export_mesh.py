@@ -47,6 +47,14 @@ def test_a_gaussians_surface_is_its_ellipsoid(name, bone):
     np.testing.assert_allclose(mesh.bounds, [low, high], atol=0.04)
 
 
+def test_a_scale_multiplies_the_places_of_a_surface(bone):
+    arguments = ["export", "bone.ply", "--mesh", "--level", "1", "--voxels", "32", "--quiet"]
+    assert main([*arguments, "--out", "a.stl"]) == 0
+    assert main([*arguments, "--out", "b.stl", "--scale", "0.25"]) == 0
+    whole, quarter = read(bone / "a.stl"), read(bone / "b.stl")
+    np.testing.assert_array_equal(quarter.bounds, whole.bounds / 4)
+
+
 def test_without_a_level_inside_and_outside_are_parted(bone, capsys):
     assert main(["export", "bone.ply", "--mesh", "--out", "a.stl", "--to", "stl", "--quiet"]) == 0
     said = capsys.readouterr().out

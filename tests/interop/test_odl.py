@@ -62,6 +62,16 @@ def test_their_operator_goes_into_our_algebra(device, odl):
     assert rift.dot_test(projector(device) @ ours) < 1e-5
 
 
+def test_their_gradient_goes_into_our_algebra(device, odl):
+    space = odl.uniform_discr([-3, -3.5], [3, 3.5], (6, 7), dtype="float32")
+    G = odl.Gradient(space)
+    ours, x = from_odl(G, device=device), white(6, 7)
+    assert ours.range == (2, 6, 7)
+    np.testing.assert_allclose(ours(x), G(space.element(x)).asarray(), atol=1e-6)
+    assert rift.dot_test(ours) < 1e-6
+    assert rift.dot_test(rift.vstack([ours, projector(device)])) < 1e-5
+
+
 def test_what_does_not_fit_is_named(device, odl):
     with pytest.raises(ShapeError, match="domain has shape"):
         to_odl(projector(device), domain=odl.rn((7, 6), dtype="float32"))
@@ -69,5 +79,12 @@ def test_what_does_not_fit_is_named(device, odl):
         to_odl(3)
     with pytest.raises(DTypeError, match="P is a ndarray, wanted a linear operator of ODL"):
         from_odl(np.eye(3), device=device)
-    with pytest.raises(DTypeError, match="product of spaces"):
-        from_odl(odl.Gradient(odl.uniform_discr([0, 0], [1, 1], (4, 4))), device=device)
+    space = odl.uniform_discr([0, 0], [1, 1], (4, 4))
+    both = odl.BroadcastOperator(odl.Gradient(space), odl.IdentityOperator(space))
+    with pytest.raises(DTypeError, match="product of unlike spaces"):
+        from_odl(both, device=device)
+    uneven = odl.ProductSpace(space, 2, weighting=[1.0, 3.0])
+    with pytest.raises(DTypeError, match="one for all"):
+        from_odl(odl.Gradient(space, range=uneven), device=device)
+    with pytest.raises(DTypeError, match="exponent 2"):
+        from_odl(odl.Gradient(space, range=odl.ProductSpace(space, 2, exponent=1)), device=device)

@@ -1,4 +1,4 @@
-"""A scene turned: positions, rotations and the directions that colours vary in, together.
+"""A scene turned and scaled: positions, rotations and the directions of colours, together.
 
 Harmonics of one degree turn into harmonics of the same degree: the matrix between their
 coefficients is found by sampling, exactly to rounding, since no degree has more functions than
@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rift_cl.basis.angular import SphericalHarmonics
+from rift_cl.errors import InputError
 from rift_cl.io.scenes.splat_scene import SplatScene
 
 Floats = NDArray[np.float64]
@@ -53,6 +54,25 @@ def turned(scene: SplatScene, turn: Floats) -> SplatScene:
         quats=quats.astype(np.float32),
         sh=sh.astype(np.float32),
     )
+
+
+def scaled(scene: SplatScene, factor: float) -> SplatScene:
+    """A scene of plain splats with every length multiplied by a factor, about the origin."""
+    if factor == 1:
+        return scene
+    means = (scene.means.astype(np.float64) * factor).astype(np.float32)
+    log_scales = (scene.log_scales.astype(np.float64) + np.log(factor)).astype(np.float32)
+    return dataclasses.replace(scene, means=means, log_scales=log_scales)
+
+
+def check_scale(factor: float) -> None:
+    """Make sure that lengths can be multiplied by a factor.
+
+    Raises:
+        InputError: it is not positive and finite.
+    """
+    if not 0 < factor < np.inf:
+        raise InputError(f"--scale is {factor:g}, wanted a factor greater than 0")
 
 
 def harmonics_turn(turn: Floats, degree: int) -> Floats:

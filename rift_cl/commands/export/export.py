@@ -14,7 +14,7 @@ import numpy as np
 
 from rift_cl.cl.budget import format_bytes
 from rift_cl.commands.cameras.film_path import first_view
-from rift_cl.commands.export.axes import turn_between, turned
+from rift_cl.commands.export.axes import check_scale, scaled, turn_between, turned
 from rift_cl.commands.export.plain_scene import plain_scene
 from rift_cl.commands.export.settings import ExportSettings, Target
 from rift_cl.commands.export.web_page import FirstView, web_page
@@ -38,8 +38,8 @@ _VIEWERS = 0.3
 class Export:
     """An export that is planned; nothing is written yet.
 
-    ``plain`` is the scene as it will be written but for ``turn`` (3, 3), which comes last, and
-    ``notes`` what is lost by it.
+    ``plain`` is the scene as it will be written but for ``turn`` (3, 3) and the scale, which come
+    last, and ``notes`` what is lost by it.
 
     Args:
         settings: what to do.
@@ -51,8 +51,11 @@ class Export:
     def __init__(self, settings: ExportSettings) -> None:
         self.settings = settings
         self.announce: Callable[[str], None] = lambda sentence: None
+        check_scale(settings.scale)
         self.scene = settings.open_scene()
         self.format = self._format(format_name(settings, "html"))
+        if self.format.suffix == _PAGE and settings.scale != 1:
+            raise InputError("a page looks the same at any --scale: leave it out")
         self.path = output_path(settings, self.format.suffix)
         self._bounds = settings.bounds(self.scene)
         self.plain, self.notes = plain_scene(self.scene.splats, self._bounds.cameras)
@@ -76,7 +79,7 @@ class Export:
                 "changes with the direction is lost (other formats keep it; a fit with "
                 "--sh-degree 0 has nothing to lose by it)"
             )
-        places = (self.plain.means @ self.turn.T).astype(np.float32)
+        places = (settings.scale * (self.plain.means @ self.turn.T)).astype(np.float32)
         self.notes += self.format.place_notes(places)
         self.notes += self._blur_notes()
 
@@ -134,7 +137,7 @@ class Export:
         """Do it; a report at the end."""
         for note in self.notes:
             self.announce(note)
-        content = self.format.encode(turned(self.plain, self.turn))
+        content = self.format.encode(scaled(turned(self.plain, self.turn), self.settings.scale))
         write_whole(self.path, content)
         self.result = f"{self.path}, {format_bytes(len(content))}"
         yield Report(len(self.plain), len(self.plain), "splats")

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rift_cl.cl.budget import format_bytes
+from rift_cl.commands.export.axes import check_scale
 from rift_cl.commands.export.export import format_name, output_path, write_whole
 from rift_cl.commands.export.fused_depth import FusedDepth
 from rift_cl.commands.export.settings import ExportSettings
@@ -48,6 +49,7 @@ class MeshExport:
     def __init__(self, settings: ExportSettings) -> None:
         self.settings = settings
         self.announce: Callable[[str], None] = lambda sentence: None
+        check_scale(settings.scale)
         self._name = format_name(settings, "ply")
         if self._name not in MESH_FORMATS:
             raise InputError(f"--to {self._name} holds no triangles: take ply, stl, obj or glb")
@@ -108,6 +110,7 @@ class MeshExport:
     def _written(
         self, vertices: NDArray[np.float32], triangles: NDArray[np.uint32], where: str, steps: int
     ) -> Report:
+        vertices = (vertices * np.float64(self.settings.scale)).astype(np.float32)
         content = MESH_FORMATS[self._name](vertices, triangles)
         write_whole(self.path, content)
         self.result = (

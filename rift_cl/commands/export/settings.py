@@ -26,6 +26,9 @@ class ExportOutput:
     out: Auto[Path] = None
     """File to write. Default: the scene's name with the extension of the format, in the current
     folder."""
+    scale: float = 1.0
+    """Factor by which every length of the scene is multiplied, such as the metres in one of its
+    units for glTF, or the millimetres for a printer."""
 
 
 @dataclass(frozen=True, kw_only=True)
