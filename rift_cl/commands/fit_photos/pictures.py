@@ -24,9 +24,8 @@ from rift_cl.cl.device import Device
 from rift_cl.commands.pictures.evenly_spaced import evenly
 from rift_cl.geometry import Camera
 from rift_cl.io.captures.capture import View, camera_at, read_known_view
-from rift_cl.io.images.display_light import to_display
+from rift_cl.io.images.display_light import LightKind, to_display
 from rift_cl.io.images.read_picture import read_picture_header
-from rift_cl.io.scenes.scene_drawing import Light
 
 # Share of the free host memory that photographs may take, and of the memory budget of a device that
 # computes in the host's memory.
@@ -83,14 +82,14 @@ class CapturePictures:
         *,
         downscale: int = 1,
         seed: int = 0,
-        light: Light = "display",
+        light: LightKind = "display",
         like: CapturePictures | None = None,
         background: Floats | None = None,
     ) -> None:
         self.device = device
         self.views = views
         self.cameras: Sequence[Camera] = [camera_at(view, downscale) for view in views]
-        self.light: Light = light
+        self.light: LightKind = light
         self._downscale, self._seed = downscale, seed
         self._kept: dict[int, _Photograph] = {}
         self._own_alpha: dict[int, bool] = {}

@@ -21,10 +21,9 @@ from rift_cl.commands.cameras.fit_cameras import CAMERA_FILES, FitCameras, open_
 from rift_cl.commands.inputs.scene_bounds import bounds_of_splats
 from rift_cl.commands.run_folder.saved_settings import read_settings
 from rift_cl.errors import FileFormatError, InputError
-from rift_cl.io.images.display_light import to_display, to_linear
+from rift_cl.io.images.display_light import LightKind, to_display, to_linear
 from rift_cl.io.images.environment_map import read_environment_map
 from rift_cl.io.json_fields import Fields, read_json_object
-from rift_cl.io.scenes.scene_drawing import Light
 from rift_cl.io.scenes.splat_scene import SplatScene
 from rift_cl.splat.settings import SplatSettings
 
@@ -70,7 +69,7 @@ class OpenedScene:
         for eps2d in (self.splats.eps2d, settings.eps2d):
             rendering = rendering if eps2d is None else replace(rendering, eps2d=eps2d)
         self.rendering = rendering
-        self.light: Light = self._light()
+        self.light: LightKind = self._light()
         self.splats = self._said()
         if settings.environment is not None:
             self.splats = self._relit(settings.environment)
@@ -155,7 +154,7 @@ class OpenedScene:
             raise FileFormatError(f"{config.where}: holds no settings of a finished fit")
         return Fields(f"{config.where}: settings", values)
 
-    def _light(self) -> Light:
+    def _light(self) -> LightKind:
         """The light that the splats' colours are in."""
         if self._settings is None or self.splats.light == "linear":
             return self.splats.light
@@ -197,7 +196,7 @@ def scene_file(path: Path) -> Path:
     return path / _SCENE
 
 
-def in_display_light(image: NDArray[np.float32], light: Light) -> NDArray[np.float32]:
+def in_display_light(image: NDArray[np.float32], light: LightKind) -> NDArray[np.float32]:
     """A rendered image in display light, 0 to 1."""
     shown = np.clip(image, 0, 1)
     if light == "linear":

@@ -15,7 +15,7 @@ from rift_cl.commands.view.photographs import Photograph, compared, seen_by, tak
 from rift_cl.commands.view.wish import KINDS, Wish
 from rift_cl.errors import RiftError
 from rift_cl.geometry import Camera
-from rift_cl.io.scenes.scene_drawing import Light
+from rift_cl.io.images.display_light import LightKind
 from rift_cl.splat.renderer import Renderer
 from rift_cl.splat.splats import Splats
 
@@ -36,7 +36,7 @@ class Painter:
         bounds: of the scene.
     """
 
-    def __init__(self, background: Floats, light: Light, bounds: SceneBounds) -> None:
+    def __init__(self, background: Floats, light: LightKind, bounds: SceneBounds) -> None:
         self._background, self._light = background, light
         distance = bounds.distance
         self._reach = bounds.radius if distance is None else distance

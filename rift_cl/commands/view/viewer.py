@@ -32,7 +32,7 @@ from rift_cl.commands.view.standpoint import standpoint_of
 from rift_cl.commands.view.wish import Wish
 from rift_cl.errors import InputError, RiftError
 from rift_cl.geometry import Camera
-from rift_cl.io.scenes.scene_drawing import Light
+from rift_cl.io.images.display_light import LightKind
 from rift_cl.splat.renderer import Renderer
 from rift_cl.splat.splats import Splats
 
@@ -137,7 +137,7 @@ class SplatViewer:
         port: int = 8080,
         size: int = 960,
         background: ArrayLike | None = None,
-        light: Light = "display",
+        light: LightKind = "display",
         title: str = "RiFT",
     ) -> None:
         behind = np.zeros(3) if background is None else background

@@ -8,7 +8,6 @@ a mean: alpha says where a scene is empty, a mask where nobody knows.
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,13 +15,12 @@ from numpy.typing import NDArray
 from rift_cl.errors import FileFormatError, InputError, NonFiniteError, ShapeError
 from rift_cl.io.boundary import check_claim
 from rift_cl.io.captures.view import View, camera_at
-from rift_cl.io.images.display_light import to_display, to_linear
+from rift_cl.io.images.display_light import LightKind, to_display, to_linear
 from rift_cl.io.images.picture_header import PictureHeader
 from rift_cl.io.images.read_picture import read_picture_header, read_pixels
 from rift_cl.io.images.resample import shrunk, undistorted
 
 Image = NDArray[np.float32]
-LightKind = Literal["display", "linear"]
 
 # By EXIF's orientation: quarter turns against the clock, and whether rows are then reversed.
 _SHOWN = {

@@ -7,10 +7,13 @@ at a time keeps the temporaries in the cache.
 from __future__ import annotations
 
 from collections.abc import Iterator
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
+# The light that colours are in.
+LightKind = Literal["display", "linear"]
 Light = NDArray[np.float32]
 
 _BLOCK = 1 << 15

@@ -13,12 +13,11 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Literal, cast, get_args
+from typing import Any, cast, get_args
 
 from rift_cl.errors import FileFormatError, InputError
 from rift_cl.geometry.numbers import one_number
-
-Light = Literal["display", "linear"]
+from rift_cl.io.images.display_light import LightKind
 
 _MARK = "rift-cl drawing:"
 _PART = re.compile(r"(light) (display|linear)|(antialiased)|(eps2d) ([0-9][0-9.e+-]{0,30})")
@@ -35,7 +34,7 @@ class SceneDrawing:
         eps2d: that they were fitted with, in square pixels; None where that is not said.
     """
 
-    light: Light = "display"
+    light: LightKind = "display"
     antialiased: bool = False
     eps2d: float | None = None
 
@@ -46,7 +45,7 @@ class SceneDrawing:
         Raises:
             InputError: a value is none that there is, or has no meaning for X-rays.
         """
-        if scene.light not in get_args(Light):
+        if scene.light not in get_args(LightKind):
             raise InputError(f"SplatScene: light is {scene.light!r}, wanted display or linear")
         eps2d = scene.eps2d
         if eps2d is not None and not 0 <= one_number(eps2d) < math.inf:
@@ -104,7 +103,9 @@ def read_drawing(path: Path, comments: Sequence[str]) -> SceneDrawing:
         raise _meaningless(path, said[0]) from error
     if eps2d is not None and not math.isfinite(eps2d):
         raise _meaningless(path, said[0])
-    return SceneDrawing(cast(Light, found.get("light", "display")), "antialiased" in found, eps2d)
+    return SceneDrawing(
+        cast(LightKind, found.get("light", "display")), "antialiased" in found, eps2d
+    )
 
 
 def _meaningless(path: Path, said: str) -> FileFormatError:

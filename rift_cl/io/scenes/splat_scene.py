@@ -22,8 +22,9 @@ from rift_cl.cl.device import Device
 from rift_cl.cl.host_arrays import as_host_array, as_real_array, check_finite
 from rift_cl.errors import FileFormatError, InputError, OutputError, ShapeError
 from rift_cl.io.boundary import reading
+from rift_cl.io.images.display_light import LightKind
 from rift_cl.io.output import atomic_path, check_space
-from rift_cl.io.scenes.scene_drawing import Light, SceneDrawing
+from rift_cl.io.scenes.scene_drawing import SceneDrawing
 from rift_cl.io.scenes.splat_activations import (
     check_range,
     drawn_strengths,
@@ -89,7 +90,7 @@ class SplatScene:
     environment: NDArray[np.float32] | None = None
     activation: Activation = "clamp"
     angular: str = "sh"
-    light: Light = "display"
+    light: LightKind = "display"
     antialiased: bool = False
     eps2d: float | None = None
     mode: ClassVar[SplatMode] = "light"
