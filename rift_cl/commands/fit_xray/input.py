@@ -41,8 +41,8 @@ from rift_cl.geometry import Camera, Cone, Grid, Parallel, Vectors
 from rift_cl.geometry.scan_cameras import ScanCameras, scan_cameras
 from rift_cl.geometry.seen_grid import scan_lengths, seen_grid
 from rift_cl.io.boundary import check_claim
+from rift_cl.io.images.display_light import LightKind
 from rift_cl.io.scans.scan_file import ScanFile
-from rift_cl.io.scenes.scene_drawing import Light
 from rift_cl.reconstruct.direct.offset_axis import is_offset, seen_bins
 
 # Line integrals are measured by the value that this share of them stays below.
@@ -362,7 +362,7 @@ class XrayPictures:
         projections: the views.
     """
 
-    light: Light = "display"
+    light: LightKind = "display"
 
     def __init__(self, device: Device, projections: Projections) -> None:
         self.device = device
