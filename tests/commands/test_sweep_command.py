@@ -152,6 +152,17 @@ def test_a_run_of_an_older_sweep_with_other_settings_is_not_done(scans, tmp_path
         done(other)
 
 
+@pytest.mark.once
+def test_a_run_of_an_input_that_was_changed_since_is_not_mixed_with_others(tmp_path):
+    scan, out = save_scan(tmp_path / "a.npz", 0), tmp_path / "out"
+    done(sweep([scan], out, ("size=8",)))
+    save_scan(scan, 1)
+    with pytest.raises(CheckpointError, match="size=8 read was changed since"):
+        done(sweep([scan], out, ("size=8,4",), resume=True))
+    job, _ = done(sweep([scan], out, ("size=8,4",), overwrite=True))
+    assert len(job.rows) == 2
+
+
 def test_paths_of_runs_are_whole(scans, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     np.savetxt("angles.txt", np.arange(12))

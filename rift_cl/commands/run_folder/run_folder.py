@@ -89,7 +89,7 @@ class RunFolder:
         self._job = job
         self._asked = None if settings is None else asked_settings(settings)
         # As it is when the run begins: what changes meanwhile is found by the next one.
-        self._read = None if settings is None else _stamps(settings, path)
+        self._read = None if settings is None else input_stamps(settings, path)
         self._overwrite = overwrite
         self._seen = self._config_stamp()
         ending = next((each for each in _OF_FILES if path.name.lower().endswith(each)), "")
@@ -370,7 +370,7 @@ def files_read(settings: Any) -> Iterator[Path]:
         yield from (Path(value) for value in several if isinstance(value, kinds))
 
 
-def _stamps(settings: Any, out: Path) -> dict[str, str]:
+def input_stamps(settings: Any, out: Path) -> dict[str, str]:
     """Sizes and times of change of what a run reads, but for its own, by whole paths."""
     own, stamps = Path(os.path.realpath(out)), decisive_parts()
     for named in files_read(settings):

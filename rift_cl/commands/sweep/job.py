@@ -14,7 +14,12 @@ from pathlib import Path
 from typing import Any
 
 from rift_cl.cl.device import Device
-from rift_cl.commands.run_folder.run_folder import RunFolder, asked_settings, files_read
+from rift_cl.commands.run_folder.run_folder import (
+    RunFolder,
+    asked_settings,
+    files_read,
+    input_stamps,
+)
 from rift_cl.commands.sweep.one_run import is_done, run, steps
 from rift_cl.commands.sweep.report import Row, sweep_page, write_table
 from rift_cl.commands.sweep.settings import SweepSettings
@@ -24,6 +29,8 @@ from rift_cl.json_parsing import parse_json
 from rift_cl.progress import Report
 
 _RUNS = "runs"
+# What a run reads, beside the settings that decide it.
+_READ = "read"
 
 
 class Sweep:
@@ -52,6 +59,8 @@ class Sweep:
         self.announce: Callable[[str], None] = lambda line: None
         # What decided the runs of earlier sweeps in the folder, by their names.
         self._before: dict[str, Any] = {}
+        # The same of this one, as it was when it began.
+        self._now: dict[str, Any] = {}
         # Why runs could not be done, by their names.
         self._refused: dict[str, str] = {}
 
@@ -78,6 +87,7 @@ class Sweep:
             InputError: no run can be done.
         """
         begin = time.perf_counter()
+        self._now = self._decisive()
         self._check_same()
         self.folder.make()
         if not self.settings.resume:
@@ -144,17 +154,23 @@ class Sweep:
 
     def _record(self) -> dict[str, Any]:
         """What decides each run that is there or will be, by its name."""
-        return {**self._before, **self._decisive()}
+        return {**self._before, **self._now}
 
     def _decisive(self) -> dict[str, Any]:
-        """What decides each run of this sweep, by its name."""
-        return {
-            each.name: parse_json(json.dumps(_decisive(each.settings), default=str))
-            for each in self.runs
-        }
+        """What decides each run of this sweep, by its name: settings, and files as they are."""
+        stamps: dict[tuple[Path, ...], dict[str, str]] = {}
+        found = {}
+        for each in self.runs:
+            # Most runs read the same files, which may be many.
+            read = tuple(files_read(each.settings))
+            if read not in stamps:
+                stamps[read] = input_stamps(each.settings, self.settings.out)
+            decisive = {**_decisive(each.settings), _READ: stamps[read]}
+            found[each.name] = parse_json(json.dumps(decisive, default=str))
+        return found
 
     def _check_same(self) -> None:
-        """Make sure that runs which are there are of these settings.
+        """Make sure that runs which are there are of these settings and files.
 
         Raises:
             CheckpointError: one is not.
@@ -166,8 +182,15 @@ class Sweep:
             self._before = dict(parse_json(path.read_text(encoding="utf-8"))["runs"])
         except (OSError, ValueError, LookupError, TypeError):
             return
-        for name, now in self._decisive().items():
-            if self._before.get(name, now) != now:
+        for name, decisive in self._now.items():
+            now, before = dict(decisive), dict(self._before.get(name, decisive))
+            reads, read = now.pop(_READ), before.pop(_READ, None)
+            if before == now and read not in (None, reads):
+                raise CheckpointError(
+                    f"{self.settings.out}: what its run {name} read was changed since: begin anew "
+                    "with --overwrite, or name another folder (--out)"
+                )
+            if before != now:
                 raise CheckpointError(
                     f"{self.settings.out}: its run {name} had other settings: repeat the options, "
                     "or begin anew with --overwrite"
