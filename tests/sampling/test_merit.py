@@ -230,3 +230,15 @@ def test_what_correlated_views_tell_twice_is_counted_once(target):
     brighter = Target((0, 0, 0), 1.0, snr=8 * target.snr, frequencies=target.k)
     assert kriging(observations, target) == pytest.approx(kriging(one, brighter), rel=1e-6)
     assert exact(observations, target, 6) == pytest.approx(exact(one, brighter, 6), rel=1e-6)
+
+
+def test_the_score_of_one_camera_is_the_same_from_all_sides():
+    """Of a round target: the axes of the world are no part of the problem."""
+    target = Target((0, 0, 0), 60.0)
+    towards = np.random.default_rng(3).normal(size=(12, 3))
+    places = 300 * towards / np.linalg.norm(towards, axis=1, keepdims=True)
+    lens = [[1000.0, 0, 128], [0, 1000.0, 128], [0, 0, 1]]
+    cameras = [Camera((256, 256), lens, look_at(at, [0, 0, 0], [0.3, 1, 0.2])) for at in places]
+    values = [merit([camera], target).value for camera in cameras]
+    assert np.ptp(values) < 0.015
+    assert abs(np.mean(values) - 0.8558) < 0.004

@@ -15,6 +15,7 @@ from rift_cl.sampling.criteria.limits import CAUSES, Limits, limits
 from rift_cl.sampling.criteria.merit import criterion_of_coverage
 from rift_cl.sampling.criteria.orlov import Orlov, orlov
 from rift_cl.sampling.criteria.tuy import tuy
+from rift_cl.sampling.targets.scattered import scattered
 
 Table = tuple[tuple[str, ...], list[tuple[Any, ...]], str]
 # Frequencies, in cycles per diameter, at which holes are looked for.
@@ -221,6 +222,6 @@ def length_in_words(frequency: float, sampled: ViewSet) -> str:
 
 def unknown_share(sampled: ViewSet) -> float:
     """The posterior variance as a fraction of the prior, for a power spectrum 1/k^2."""
-    target = sampled.target
+    target = scattered(sampled.target)
     found = host_coverage(sampled.observations(), target.k, target.diameter)
     return criterion_of_coverage("wiener", found, target).value

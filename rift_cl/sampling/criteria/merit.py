@@ -58,8 +58,9 @@ def merit(
     worst seen direction. All three are functions of the coverage alone: where views tell the same
     twice their values are optimistic, while their ranking holds.
     ``kriging`` and ``exact`` count correlated views as what they are; they have no gradient and
-    take long. A target that no camera sees is all unknown: 1, or no bits. A target of mode
-    ``surface`` is scored by ``surface_merit``.
+    take long. Where the target's frequencies were not given, the others are taken at those that
+    plans are judged at, ten times as many as ``target.k``. A target that no camera sees is all
+    unknown: 1, or no bits. A target of mode ``surface`` is scored by ``surface_merit``.
 
     Args:
         cameras: V views, at least one.
@@ -81,6 +82,7 @@ def merit(
             f"merit: kind is {kind!r}, wanted one of {', '.join(get_args(CriterionKind))}"
         )
     # Imported when used: a target names the criteria that it takes.
+    from rift_cl.sampling.targets.scattered import scattered
     from rift_cl.sampling.targets.target import Target
 
     check_type("merit", "target", target, Target)
@@ -93,7 +95,7 @@ def merit(
     if target.mode == "surface":
         value, by_observations = surface_criterion(observations, target, kind)
     else:
-        value, by_observations = _volume(observations, target, kind, device)
+        value, by_observations = _volume(observations, scattered(target), kind, device)
     return Merit(value, camera_gradients(cameras, unweighted, by_observations))
 
 
