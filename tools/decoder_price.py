@@ -10,6 +10,7 @@ clock, the least of some rounds.
 
 from __future__ import annotations
 
+import argparse
 import subprocess
 import sys
 import tempfile
@@ -31,6 +32,9 @@ _ROUNDS = 5
 
 def main() -> None:
     """Print a line for each price."""
+    argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    ).parse_args()
     for name in _LIBRARIES:
         print(f"start of a child with NumPy and {name}: {_least(partial(_start, name)):.2f} s")
     with tempfile.TemporaryDirectory() as folder:

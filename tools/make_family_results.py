@@ -7,6 +7,8 @@ They go into ``rift_cl/commands/devices/families.npz``.
 
 from __future__ import annotations
 
+import argparse
+
 import numpy as np
 
 from rift_cl import open_device
@@ -15,6 +17,9 @@ from rift_cl.commands.devices.families import FAMILIES, STORED
 
 def main() -> None:
     """Compute every family and store what came."""
+    argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    ).parse_args()
     device = open_device()
     results = {
         f"{name}/{key}": array

@@ -8,6 +8,7 @@ help loads is pinned by a test; the time depends on the machine and is only show
 
 from __future__ import annotations
 
+import argparse
 import os
 import statistics
 import subprocess
@@ -38,6 +39,9 @@ def processor_time(*arguments: str) -> float:
 
 def main() -> None:
     """Print the table."""
+    argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    ).parse_args()
     version = processor_time("--version")
     print(f"{'rift --version':<26} {version:6.3f} s")
     for arguments in (["--help"], *([*name.split(), "--help"] for name in COMMANDS)):

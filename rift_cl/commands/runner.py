@@ -1,8 +1,8 @@
 """How a command is run: its errors become sentences and exit statuses, its progress goes to stderr.
 
 Exit statuses: 0 ok, 2 usage (an unknown option, or no number where one is wanted), 3 input (a file
-or a value that cannot be used), 4 device, 5 output, 130 interrupted (also a fit that keeps a
-checkpoint at SIGTERM), 143 ended by SIGTERM.
+or a value that cannot be used), 4 device, 5 output, 130 interrupted (also a run that keeps
+what it has done at SIGTERM), 143 ended by SIGTERM with nothing kept.
 """
 
 from __future__ import annotations
@@ -30,6 +30,8 @@ from rift_cl.errors import RiftError, SettingError
 from rift_cl.option_marks import EXPERT, Group
 from rift_cl.progress import Report
 
+# What Python says where the system gives it no thread.
+_NO_THREAD = "can't start new thread"
 _INPUT, _DEVICE, _OUTPUT, _INTERRUPTED, _TERMINATED = 3, 4, 5, 130, 143
 # Options have names of their own, whichever group they are in.
 _OMITTED: Any = tyro.conf.OmitArgPrefixes
@@ -69,7 +71,8 @@ def exit_status(run: Callable[[], int]) -> int:
         return 0
     except OSError as error:
         sys.stdout = open(os.devnull, "w")  # noqa: PTH123, SIM115 - kept open until the end
-        return _say(f"rift: the output cannot be written ({error.strerror})", _OUTPUT)
+        what = "standard output" if error.filename is None else error.filename
+        return _say(f"rift: {what} cannot be written ({error.strerror})", _OUTPUT)
     return status
 
 
@@ -242,6 +245,10 @@ def _guarded(
         return _say(f"rift: {_sentence(error, settings)}", error.exit_status)
     except MemoryError as error:
         return _say(f"rift: there is too little memory for this ({error}): ask for less", _INPUT)
+    except RuntimeError as error:
+        if _NO_THREAD not in str(error):
+            raise
+        return _say(f"rift: {error}: let this process have more memory or threads (ulimit)", _INPUT)
     return 0
 
 

@@ -5,13 +5,14 @@ import os
 import shlex
 import subprocess
 import sys
+import threading
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 import rift_cl as rift
-from rift_cl.commands.cli import main
+from rift_cl.commands.cli import COMMANDS, main
 
 # No fit: tests that look at other things should not wait for one.
 NO_FIT = ("--steps", "0")
@@ -120,7 +121,29 @@ def test_closed_and_full_streams_are_survived(how, tmp_path):
     )
     assert done.returncode == (5 if how == "> /dev/full" else 0)
     assert "Traceback" not in done.stderr
+    assert ("standard output cannot be written" in done.stderr) == (how == "> /dev/full")
     assert (tmp_path / "d" / "report.html").exists()
+
+
+def test_a_thread_that_the_system_does_not_give_is_one_sentence(monkeypatch, capsys):
+    def start(self):
+        raise RuntimeError("can't start new thread")
+
+    monkeypatch.setattr(threading.Thread, "start", start)
+    started = COMMANDS["cache"]._replace(run=lambda *_: threading.Thread().start())
+    monkeypatch.setitem(COMMANDS, "cache", started)
+    assert main(["cache"]) == 3
+    said = capsys.readouterr().err
+    assert "ulimit" in said and "Traceback" not in said
+
+
+def test_any_other_error_of_the_interpreter_is_a_defect(monkeypatch):
+    def broken(*_):
+        raise RuntimeError("anything else")
+
+    monkeypatch.setitem(COMMANDS, "cache", COMMANDS["cache"]._replace(run=broken))
+    with pytest.raises(RuntimeError, match="anything else"):
+        main(["cache"])
 
 
 @pytest.mark.parametrize("encoding", ["ascii", "utf-8"])

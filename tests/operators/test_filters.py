@@ -8,7 +8,7 @@ import pytest
 from rift_cl import Fan, Grid, HighPass, Parallel, Projector, Ramp, Response, dot_test, fbp
 from rift_cl.errors import InputError, ShapeError
 from rift_cl.operators import FILTERS, ViewFilter, as_filter, register_filter
-from rift_cl.operators.filters.ramp_filters import Finer
+from rift_cl.operators.filters.ramp_filters import WINDOWS, Finer
 from rift_cl.reference import filter_rows, ramp_taps, response_taps, shepp_logan_taps
 
 pytestmark = pytest.mark.dealt
@@ -49,6 +49,21 @@ def test_filtering_equals_convolution(device, bins, rows):
     y = white(*F.domain)
     # float32 sums of up to 130 terms of random sign; 2e-7 measured.
     assert relative(F(y), filter_rows(y, taps, PITCH, gains)) <= 1e-6
+
+
+@pytest.mark.parametrize("name", AT_NYQUIST)
+@pytest.mark.parametrize("cutoff", [0.5, 0.37])
+@pytest.mark.parametrize("bins", [64, 129])
+def test_a_window_ends_at_its_cutoff_wherever_that_lies_between_frequencies(name, cutoff, bins):
+    """Taps are the integral of the windowed ramp, here by 20,000 trapezes."""
+    f = np.linspace(0, cutoff / 2, 20001)
+    ramp = f * WINDOWS[name](2 * f / cutoff)
+    n = np.arange(bins)
+    exact = 2 * np.trapezoid(ramp * np.cos(2 * np.pi * np.outer(n, f)), f, axis=1)
+    taps = Ramp(name, cutoff).taps(bins, 1.0)[bins - 1 :]
+    # What is left is the ringing of a hard end, which the transform's length cuts off; with the
+    # last frequency taken whole it is 6.6e-2.
+    assert relative(taps, exact) <= 1.2e-2
 
 
 @pytest.mark.parametrize("name", NAMES)

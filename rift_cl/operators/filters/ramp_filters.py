@@ -96,7 +96,11 @@ class Ramp:
         exact = np.where(n % 2 == 1, -1 / (np.pi * np.maximum(n, 1)) ** 2, 0.0)
         exact[0] = 0.25  # at position zero; what is at frequency zero is the sum of all taps
         u = 2 * np.fft.rfftfreq(length) / self.cutoff
-        window = np.where(u <= 1, WINDOWS[self.window](np.minimum(u, 1)), 0.0)
+        window = WINDOWS[self.window](np.minimum(u, 1))
+        if self.cutoff < 1:
+            # A frequency of the transform stands for those half a step about it, so that the one
+            # at which the window ends counts for the part that is within.
+            window[1:] *= np.clip((1 - u[1:]) / u[1] + 0.5, 0, 1)
         kernel = np.fft.irfft(np.fft.rfft(exact) * window, length)[:bins] / pitch**2
         return np.concatenate([kernel[:0:-1], kernel])
 
