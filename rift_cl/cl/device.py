@@ -61,9 +61,9 @@ class Device:
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Travel as the selector; the receiving process opens its own context."""
-        from rift_cl.cl.discovery import open_device
+        from rift_cl.cl.discovery import reopened
 
-        return open_device, (self.selector, self._limit)
+        return reopened, (self.selector, self._limit)
 
     @property
     def kind(self) -> str:

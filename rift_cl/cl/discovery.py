@@ -18,7 +18,7 @@ from rift_cl.cl.build.intel_runtime import register_intel_runtime
 from rift_cl.cl.build.kernel_cache import prepare_cache
 from rift_cl.cl.device import Device
 from rift_cl.cl.process import claim_process
-from rift_cl.errors import NoDeviceError
+from rift_cl.errors import ForkedContextError, NoDeviceError
 
 _INSTALL = (
     "install a driver: your GPU vendor's OpenCL package, or on Linux x86-64 a CPU driver from "
@@ -91,6 +91,26 @@ def open_device(selector: str | None = None, memory: int | None = None) -> Devic
     if memory is None:
         return chosen
     return Device(chosen._handle, chosen.selector, memory=memory)
+
+
+def reopened(selector: str, memory: int | None) -> Device:
+    """The device that pickle sent to this process.
+
+    A process that was forked, in which no device can be opened, is given the one that it inherited,
+    and is told of it by whatever it does with that. Told of it here, a worker of
+    ``multiprocessing.Pool`` would end, and whoever waits for its result would wait for ever.
+
+    Raises:
+        NoDeviceError: this process has no such device.
+    """
+    try:
+        return open_device(selector, memory)
+    except ForkedContextError:
+        inherited = _found() if _found.cache_info().currsize else ()
+        for device in inherited:
+            if device.selector == selector:
+                return device
+        raise
 
 
 def alike_devices(device: Device, selector: str | None = None) -> list[Device]:

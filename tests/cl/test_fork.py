@@ -25,12 +25,14 @@ IN_CHILD = (
     "rift.Device(held._handle, held.selector).array(np.ones(4))",
     "rift.devices()",
     "rift.default_device()",
-    "pickle.loads(pickle.dumps(held))",
+    "pickle.loads(pickle.dumps(held)).array(np.ones(4))",
+    "pickle.loads(pickle.dumps(rift.Projector(GRID, SCAN, device=held)))(np.ones((4, 4)))",
 )
 PROGRAM = """
 import os, pickle, signal, warnings
 import numpy as np, rift_cl as rift
 from rift_cl.cl.self_test import self_test
+GRID, SCAN = rift.Grid((4, 4)), rift.Parallel(np.linspace(0, 3, 5), 6)
 warnings.simplefilter("ignore")  # newer Pythons warn of fork in a process with threads
 {before}
 for use in {in_child!r}:
@@ -77,6 +79,27 @@ def test_forked_child_may_still_exit_in_the_ordinary_way(python):
         "print(os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]))"
     )
     assert done.stdout.split() == ["7"], done.stderr
+
+
+@pytest.mark.parametrize(
+    "operator",
+    ["A", "A.T", "2 * A.T @ A", "rift.FilteredBackprojection(A) @ A", "rift.vstack(A, A)"],
+)
+def test_a_forked_pool_is_told_and_does_not_wait_for_ever(python, operator):
+    done = python(
+        "import multiprocessing, signal, warnings, numpy as np, rift_cl as rift\n"
+        "warnings.simplefilter('ignore')\n"
+        "signal.alarm(100)\n"
+        "A = rift.Projector(rift.Grid((4, 4)), rift.Parallel(np.linspace(0, 3, 5), 6))\n"
+        f"A = {operator}\n"
+        "A(np.ones(A.domain))\n"
+        "with multiprocessing.get_context('fork').Pool(2) as pool:\n"
+        "    try:\n"
+        "        pool.map(A, [np.ones(A.domain)] * 3)\n"
+        "    except rift.RiftError as error:\n"
+        "        print(type(error).__name__)\n"
+    )
+    assert done.stdout.split() == ["ForkedContextError"], done.stderr
 
 
 def test_spawned_worker_works_on_the_device_it_is_sent(tmp_path):
