@@ -178,7 +178,7 @@ class ViewerPage:
         client.flush()
 
     def tell(self, facts: str) -> None:
-        """What the panel says about the last picture."""
+        """What the panel says about the last picture, in plain lines."""
         with sending():
             self.view.tell(facts)
 

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from rift_cl.commands.view.markdown import markdown_of
 from rift_cl.commands.view.standpoint import Standpoint
 from rift_cl.commands.view.viser_camera import go, pose_of
 from rift_cl.commands.view.wish import KINDS, Kind
@@ -96,8 +97,8 @@ class ViewPanel:
         return int(np.clip(self._size.value, _SMALLEST, _LARGEST))
 
     def tell(self, facts: str) -> None:
-        """What the panel says about the last picture."""
-        self._facts.content = facts
+        """What the panel says about the last picture, in plain lines."""
+        self._facts.content = markdown_of(facts)
 
     def _set_up(self, client: Any) -> None:
         """Take the page's own upright for the scene's."""
@@ -107,5 +108,5 @@ class ViewPanel:
         up = -pose.camera(_SMALLEST).view[1, :3]
         self._server.scene.set_up_direction(tuple(up.tolist()))
         client.camera.up_direction = up
-        self._up.content = "`--up " + " ".join(f"{part:.4f}" for part in up) + "`"
+        self._up.content = markdown_of("--up " + " ".join(f"{part:.4f}" for part in up))
         self._up.visible = True

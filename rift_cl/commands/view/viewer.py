@@ -264,7 +264,7 @@ class SplatViewer:
                 client.splats[0].visible = client.alone = False
 
     def _facts(self, splats: Splats, camera: Camera, seconds: float) -> str:
-        """What the panel says: lines of Markdown."""
+        """What the panel says, in plain lines."""
         arrays = [array for array in vars(splats).values() if array is not None]
         megabytes = sum(array.nbytes for array in arrays) / 2**20
         lines = [
@@ -273,7 +273,7 @@ class SplatViewer:
             f"{1 / max(seconds, 1e-6):.3g} pictures a second",
             *filter(None, [self.state, self._painter.trouble]),
         ]
-        return "  \n".join(lines)
+        return "\n".join(lines)
 
     def _joined(self, handle: Any, pose: Pose) -> None:
         with self._lock:
