@@ -163,7 +163,8 @@ def render(
     Args:
         means: (N, 3) positions; all tensors are float32 and on one device of torch's.
         quats: (N, 4) rotations (w, x, y, z); None with ``covars``.
-        scales: (N, 3) standard deviations; None with ``covars``.
+        scales: (N, 3) standard deviations, all above 0, or a splat is not drawn and gets no
+            gradient; None with ``covars``.
         opacities: (N,) opacities, or densities in xray mode.
         viewmats: (V, 4, 4) world-to-camera matrices.
         Ks: (V, 3, 3) intrinsics in pixels.
