@@ -163,6 +163,22 @@ def test_hostile_arrays_are_named(score):
         score(good, good.astype(str))
 
 
+class NeedsGradient:
+    """Refuses to become an array as a tensor of torch does."""
+
+    def __array__(self, *_, **__):
+        raise RuntimeError("Can't call numpy() on Tensor that requires grad.\nSee the manual.")
+
+
+@pytest.mark.parametrize("score", SCORES)
+def test_what_numpy_cannot_read_is_named_with_its_own_words(score):
+    good = np.zeros((12, 12))
+    with pytest.raises(DTypeError, match=r"image cannot be read.*requires grad\.$"):
+        score(NeedsGradient(), good)
+    with pytest.raises(DTypeError, match="truth cannot be read"):
+        score(good, NeedsGradient())
+
+
 @pytest.mark.parametrize("score", SCORES)
 def test_hostile_masks_are_named(score):
     good = np.zeros((12, 12))

@@ -65,7 +65,7 @@ class Camera:
         aperture: Aperture | None = None,
     ) -> None:
         """Check the arguments and bring them into their normal form."""
-        object.__setattr__(self, "size", _size(size))
+        object.__setattr__(self, "size", image_size(size))
         object.__setattr__(self, "K", _intrinsics(K))
         object.__setattr__(self, "view", _pose(view))
         if model not in get_args(CameraModel):
@@ -130,7 +130,12 @@ class Camera:
         return center
 
 
-def _size(size: Sequence[int]) -> tuple[int, int]:
+def image_size(size: Sequence[int]) -> tuple[int, int]:
+    """The size of an image as whole numbers (height, width).
+
+    Raises:
+        ShapeError: it is no such pair.
+    """
     numbers = real_numbers(size)
     if numbers is None or numbers.shape != (2,) or not _countable(numbers):
         raise ShapeError(

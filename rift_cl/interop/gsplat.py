@@ -30,6 +30,8 @@ from rift_cl.splat.settings import SplatSettings
 
 __all__ = ["rasterization"]
 
+# The standard deviation of what gsplat's products of scales make flat; ours are positive.
+_FLAT = 1e-20
 _MODES = ("RGB", "D", "ED", "RGB+D", "RGB+ED")
 
 
@@ -77,7 +79,8 @@ def rasterization(
     Args:
         means: (..., N, 3) centres.
         quats: (..., N, 4) rotations (w, x, y, z) of any length; ignored with ``covars``.
-        scales: (..., N, 3) standard deviations; ignored with ``covars``.
+        scales: (..., N, 3) standard deviations, of either sign, 0 for what is flat; ignored with
+            ``covars``.
         opacities: (..., N).
         colors: (..., [C,] N, D) colours or, with ``sh_degree``, (..., [C,] N, K, 3) coefficients.
         viewmats: (..., C, 4, 4) world-to-camera matrices.
@@ -149,6 +152,8 @@ def rasterization(
         name: check_tensor(name, value, (*batch, *shape), means).reshape(-1, *shape)
         for name, (value, shape) in given.items()
     }
+    if covars is None:
+        flat["scales"] = flat["scales"].abs().clamp_min(_FLAT)
     settings = SplatSettings(
         near=near_plane,
         far=far_plane,

@@ -16,6 +16,7 @@ import math
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rift_cl.cl.device import Device
 from rift_cl.errors import DTypeError
@@ -44,7 +45,8 @@ def from_pylops(P: Any, *, device: Device | None = None) -> LinearOperator:
     Args:
         P: a real operator with ``shape``, ``dtype``, ``matvec`` and ``rmatvec``; ``dims`` and
             ``dimsd``, where it has them, are the shapes of domain and range. A sparse or dense
-            matrix becomes one by ``scipy.sparse.linalg.aslinearoperator``.
+            matrix becomes one by ``scipy.sparse.linalg.aslinearoperator``. Where SciPy was given no
+            ``rmatvec``, a ``DTypeError`` says so when the adjoint is applied.
         device: whose arrays the result takes as well; the default one if not given.
 
     Raises:
@@ -59,12 +61,23 @@ def from_pylops(P: Any, *, device: Device | None = None) -> LinearOperator:
     rows, columns = P.shape
     return HostOperator(
         lambda x: P.matvec(x.ravel()),
-        lambda y: P.rmatvec(y.ravel()),
+        lambda y: _adjoint(P, y.ravel()),
         _shape(P, "dims", columns),
         _shape(P, "dimsd", rows),
         dtype=np.float32 if P.dtype is None else P.dtype,
         device=device,
     )
+
+
+def _adjoint(P: Any, y: NDArray[Any]) -> Any:
+    """``P' y``; SciPy tells of a function that it was not given only when it wants it."""
+    try:
+        return P.rmatvec(y)
+    except NotImplementedError as error:
+        raise DTypeError(
+            f"P is a {type(P).__name__} without an adjoint ({error}), which A.T and solvers need: "
+            "make it with rmatvec="
+        ) from error
 
 
 def _shape(P: Any, name: str, count: int) -> tuple[int, ...]:

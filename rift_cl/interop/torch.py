@@ -19,7 +19,7 @@ import torch
 from rift_cl.cl.device import Device
 from rift_cl.cl.discovery import default_device
 from rift_cl.errors import InputError, ShapeError
-from rift_cl.geometry.camera import CameraModel
+from rift_cl.geometry.camera import CameraModel, image_size
 from rift_cl.interop.raster_function import Parts, rasterize_flat
 from rift_cl.interop.splat_functions import Drawer, Project, Shade
 from rift_cl.interop.tensors import check_tensor
@@ -62,7 +62,8 @@ def drawer(
     device: Device | None = None,
 ) -> Drawer:
     """What all stages are told: image size, camera model, settings, OpenCL device."""
-    return Drawer(device or default_device(), settings or SplatSettings(), size, model)
+    settings = settings or SplatSettings()
+    return Drawer(device or default_device(), settings, image_size(size), model)
 
 
 def project(
@@ -163,7 +164,8 @@ def render(
     Args:
         means: (N, 3) positions; all tensors are float32 and on one device of torch's.
         quats: (N, 4) rotations (w, x, y, z); None with ``covars``.
-        scales: (N, 3) standard deviations; None with ``covars``.
+        scales: (N, 3) standard deviations, all above 0, or a splat is not drawn and gets no
+            gradient; None with ``covars``.
         opacities: (N,) opacities, or densities in xray mode.
         viewmats: (V, 4, 4) world-to-camera matrices.
         Ks: (V, 3, 3) intrinsics in pixels.

@@ -9,7 +9,8 @@
 Slices have the dimensions y, x, volumes z, y, x. Sinograms have theta (radians), then row where
 there are several, then detector, both in the unit of length from where the axis is seen. What
 coordinates do not tell, as the distances of a source, is in the attributes, so that either kind is
-written and read by xarray's own formats.
+written and read by xarray's own formats. A coordinate of one sample has the attributes "spacing"
+and "spacing_units"; of more samples their places tell, whatever is done to them.
 """
 
 from __future__ import annotations
@@ -30,7 +31,7 @@ __all__ = ["from_xarray", "to_xarray"]
 
 Floats = NDArray[np.float32]
 Labelled = Grid | Parallel | Fan | Cone
-_KIND, _STEP = "scan", "spacing"
+_KIND, _STEP, _STEP_UNIT = "scan", "spacing", "spacing_units"
 # Units of angles in radians, by the names that CF, UDUNITS and pint have for them; spaces as "_".
 _ANGLES = {
     **dict.fromkeys(("", "1", "rad", "rads", "radian", "radians"), 1.0),
@@ -80,7 +81,7 @@ def to_xarray(values: ArrayLike, of: Labelled, *, unit: str = "", name: str | No
         array,
         dims=list(coordinates),
         coords={
-            axis: (axis, places, {**about, **({"units": unit} if unit and axis != "theta" else {})})
+            axis: (axis, places, about | (_in_unit(unit, about) if axis != "theta" else {}))
             for axis, (places, about) in coordinates.items()
         },
         attrs={**attributes, **({"units": value_unit} if value_unit else {})},
@@ -96,7 +97,9 @@ def from_xarray(array: Any) -> tuple[Floats, Labelled]:
             perhaps row, in any order. Coordinates are evenly spaced, all lengths in one unit, those
             of theta in radians or, as their attribute "units" says, in degrees or milliradians.
             Those that fall are turned round. A scan is parallel unless the attribute "scan" is
-            "Fan" or "Cone" and the distances are there, in the unit of the coordinates.
+            "Fan" or "Cone" and the distances are there, in the unit of the coordinates. A
+            coordinate with one sample has the attribute "spacing", in the unit of its attribute
+            "spacing_units" or else of the coordinate: one that is left of several has it not.
 
     Returns:
         The values, float32 in the order of dimensions named here, and the grid or scan.
@@ -104,8 +107,8 @@ def from_xarray(array: Any) -> tuple[Floats, Labelled]:
     Raises:
         DTypeError: it is no ``DataArray`` of real numbers.
         ShapeError: it has other dimensions.
-        InputError: a coordinate is missing or uneven, or a distance is; or the coordinates are in
-            several units of length, or theta in no unit of angle.
+        InputError: a coordinate is missing or uneven, or a distance is, or the spacing of one
+            sample; or the coordinates are in several units of length, or theta in no unit of angle.
     """
     if not all(hasattr(array, name) for name in ("dims", "coords", "attrs", "transpose")):
         raise DTypeError(f"array is a {type(array).__name__}, wanted an xarray.DataArray")
@@ -131,7 +134,7 @@ def from_xarray(array: Any) -> tuple[Floats, Labelled]:
 def _grid_labels(grid: Grid) -> tuple[dict[str, Any], dict[str, Any]]:
     axes = "zyx"[-len(grid.shape) :]
     labels = {
-        axis: (grid.coordinates(number), {_STEP: grid.spacing[number]})
+        axis: _label(grid.coordinates(number), grid.spacing[number])
         for number, axis in enumerate(axes)
     }
     return labels, {}
@@ -143,19 +146,30 @@ def _scan_labels(
     labels: dict[str, Any] = {"theta": (scan.angles, {"units": "rad"})}
     if isinstance(scan, Cone):
         (high, wide), (row, column) = scan.pitch, scan.center
-        labels["row"] = ((np.arange(scan.rows) - row) * high, {_STEP: high})
+        labels["row"] = _label((np.arange(scan.rows) - row) * high, high)
         if np.any(scan.heights):
             raise InputError("a cone with heights has no one place of each row: label its views")
     else:
         wide, column = scan.pitch, scan.center
         if values.ndim == 3:
-            labels["row"] = (np.arange(values.shape[1], dtype=np.float64), {_STEP: 1.0})
-    labels["detector"] = ((np.arange(scan.bins) - column) * wide, {_STEP: wide})
+            labels["row"] = (np.arange(values.shape[1], dtype=np.float64), {})
+    labels["detector"] = _label((np.arange(scan.bins) - column) * wide, wide)
     attributes: dict[str, Any] = {_KIND: type(scan).__name__}
     if not isinstance(scan, Parallel):
         attributes |= {n: getattr(scan, n) for n in ("source_to_axis", "source_to_detector")}
         attributes["curved"] = int(scan.curved)
     return labels, attributes
+
+
+def _label(places: NDArray[Any], step: float) -> tuple[NDArray[Any], dict[str, Any]]:
+    """The places of samples and, where these do not tell their spacing, an attribute that does."""
+    return places, {_STEP: step} if len(places) == 1 else {}
+
+
+def _in_unit(unit: str, about: dict[str, Any]) -> dict[str, str]:
+    """The attributes that name the unit of a coordinate, and of what its attributes hold."""
+    names = ("units", _STEP_UNIT) if _STEP in about else ("units",)
+    return dict.fromkeys(names, unit) if unit else {}
 
 
 def _grid(array: Any, order: list[str]) -> Grid:
@@ -234,12 +248,35 @@ def _places(array: Any, axis: str) -> NDArray[np.float64]:
 
 
 def _step(array: Any, axis: str) -> float:
-    """The spacing of a coordinate that rises evenly; as it is noted where the places agree."""
+    """The spacing of a coordinate that rises evenly."""
     places = _places(array, axis)
-    noted = one_number(array.coords[axis].attrs.get(_STEP, 1.0))
     if len(places) == 1:
-        return noted
+        return _noted_step(array, axis)
     step = float((places[-1] - places[0]) / (len(places) - 1))
     if not (step > 0 and np.abs(np.diff(places) - step).max() <= _EVEN * step):
         raise InputError(f"the coordinate {axis} is not evenly spaced: resample it with .interp()")
-    return noted if abs(noted - step) <= _EVEN * step / len(places) else step
+    return step
+
+
+def _noted_step(array: Any, axis: str) -> float:
+    """The spacing of a coordinate of one sample, as its attribute says it, in its own unit.
+
+    Raises:
+        InputError: it says none, or in a unit that is not that of the coordinate.
+    """
+    about, unit = array.coords[axis].attrs, _unit(array, axis)
+    if _STEP not in about:
+        raise InputError(
+            f"the coordinate {axis} has one sample, which does not tell its spacing: set "
+            f"array.{axis}.attrs[{_STEP!r}]"
+        )
+    step, own = one_number(about[_STEP]), str(about.get(_STEP_UNIT) or unit).strip()
+    here, there = length_unit(unit), length_unit(own)
+    if here is not None and there is not None:
+        return step if here == there else step * there.metres / here.metres
+    if own != unit:
+        raise InputError(
+            f"the coordinate {axis} is in {unit or 'no unit'} and its attribute {_STEP} in {own}: "
+            f"convert it, and name its unit in the attribute {_STEP_UNIT}"
+        )
+    return step

@@ -68,8 +68,12 @@ class Hdf5Tree:
             check_heaps(node)
         return node
 
-    def dataset(self, name: str) -> Any:
+    def dataset(self, name: str, *, remedy: str = HOW_TO_NAME) -> Any:
         """The dataset of that name, whose storage was found to lie in the file's folder.
+
+        Args:
+            name: its path in the file.
+            remedy: what to do where there is none.
 
         Raises:
             FileFormatError: there is none; the error lists those that there are.
@@ -77,17 +81,17 @@ class Hdf5Tree:
         """
         node = self.find(name)
         if not isinstance(node, h5py.Dataset):
-            raise FileFormatError(f"{self.path}: has no dataset {name!r}; {self.contents()}")
+            raise FileFormatError(f"{self.path}: has no dataset {name!r}; {self.contents(remedy)}")
         self._check_storage(node, ())
         return node
 
-    def contents(self) -> str:
-        """A phrase that lists the first datasets of the file, and how to name one."""
+    def contents(self, remedy: str = HOW_TO_NAME) -> str:
+        """A phrase that lists the first datasets of the file, and says what to do."""
         found = [f"{name!r} {shape}" for name, shape in self.datasets(_LISTED + 1)]
         if not found:
             return "it holds no dataset at all"
         more = ", ..." if len(found) > _LISTED else ""
-        return f"it holds {', '.join(found[:_LISTED])}{more}: {HOW_TO_NAME}"
+        return f"it holds {', '.join(found[:_LISTED])}{more}: {remedy}"
 
     def datasets(self, most: int) -> list[tuple[str, tuple[int, ...]]]:
         """Names and shapes of the first datasets that no link leads to."""

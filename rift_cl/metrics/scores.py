@@ -172,10 +172,15 @@ def finite_values(name: str, array: ArrayLike) -> _Reals:
     """An array of real numbers in double precision.
 
     Raises:
-        DTypeError: it is not real.
+        DTypeError: it is not real, or NumPy cannot read it.
         NonFiniteError: it holds NaN or infinity.
     """
-    given: NDArray[Any] = np.asarray(array)
+    try:
+        given: NDArray[Any] = np.asarray(array)
+    except (TypeError, ValueError, RuntimeError) as error:
+        # A tensor that requires a gradient, or is on another device, says itself what to do.
+        reason = next(iter(str(error).splitlines()), type(error).__name__)
+        raise DTypeError(f"{name} cannot be read as an array of numbers: {reason}") from error
     if given.dtype.kind not in "biuf":
         raise DTypeError(f"{name} has type {given.dtype}, wanted real numbers")
     values = given.astype(np.float64)

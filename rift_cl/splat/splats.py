@@ -36,7 +36,8 @@ class Splats:
     Args:
         means: (N, 3) positions in world coordinates.
         quats: (N, 4) rotations as quaternions (w, x, y, z) of any length; None with ``covars``.
-        scales: (N, 3) standard deviations along the rotated axes; None with ``covars``.
+        scales: (N, 3) standard deviations along the rotated axes, all above 0, or a splat is not
+            drawn; None with ``covars``.
         opacities: (N,) opacities, 0 to 1; densities at the peak, per length, in xray mode.
         colors: (N, D) features, or None.
         sh: (N, K, 3) coefficients of spherical harmonics, K = 1, 4, 9, 16 or 25, or None.

@@ -52,7 +52,8 @@ def test_a_scan_becomes_densities_slices_and_a_report(scans, tmp_path, capsys, r
     out = tmp_path / "fit"
     splats = 400 * rows
     by = "coverage" if rows == 1 else "ramp"
-    more = ("--homogenise", "0.5", "--homogenise-by", by, "--steps", "120")
+    unit = ("--unit", "mm") if rows == 4 else ()
+    more = ("--homogenise", "0.5", "--homogenise-by", by, "--steps", "120", *unit)
     assert fit(path, out, *more, splats=splats) == 0
     assert "held out" in capsys.readouterr().out
     slices = read_volume(out / "slices")
@@ -75,6 +76,7 @@ def test_a_scan_becomes_densities_slices_and_a_report(scans, tmp_path, capsys, r
         assert area == pytest.approx(truth.sum() * PITCH**2, rel=0.05)
     page = (out / "report.html").read_text()
     assert page.count('class="slider"') == 1 and "filtered backprojection" in page
+    assert f"Attenuation per {'mm' if unit else 'unit of length'}:" in page
     config = json.loads((out / "config.json").read_text())
     assert config["complete"] and config["job"] == "fit xray"
 

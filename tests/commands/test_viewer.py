@@ -5,6 +5,7 @@ from __future__ import annotations
 import socket
 import sys
 from dataclasses import replace
+from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
@@ -160,6 +161,11 @@ def test_a_page_gets_its_picture_once(viewer, drawn):
     np.testing.assert_allclose(picture[40, 60], (1, 0, 0), atol=0.02)
     np.testing.assert_allclose(picture[2, 2], (0, 0, 1), atol=0.02)
     assert "1 splats" in viewer._page.said and "120 x 80 pixels" in viewer._page.said
+
+
+def test_the_page_of_the_viewer_says_what_its_pictures_are_sent_as():
+    page = Path(__file__).parents[2] / "docs" / "how-to" / "viewer.md"
+    assert f"JPEG of quality {viewer_module._SHARP}" in page.read_text("utf-8")
 
 
 def test_a_camera_that_moves_gets_less_and_all_when_it_rests(viewer, drawn):

@@ -228,3 +228,41 @@ def test_bands_change_no_bit(device):
     banded, _, lists = draw(small, scene())
     assert torch.equal(whole, banded)
     assert torch.equal(meta["isect_ids"], lists["isect_ids"])
+
+
+def covariances_of(quats, scales):
+    """R S S' R' as gsplat multiplies it, by torch alone."""
+    w, x, y, z = torch.nn.functional.normalize(quats, dim=-1).unbind(-1)
+    rows = (
+        *(1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)),
+        *(2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)),
+        *(2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)),
+    )
+    spread = torch.stack(rows, -1).reshape(-1, 3, 3) * scales[:, None, :]
+    return spread @ spread.transpose(1, 2)
+
+
+def test_the_sign_of_a_scale_says_nothing_and_0_is_flat_as_in_products_of_scales(device):
+    found = []
+    for given_as in ("scales", "covariances"):
+        given = scene(grad=True)
+        with torch.no_grad():
+            given["scales"][::3, 1] *= -1
+            given["scales"][1::3, 2] = 0
+        leaves = quats, scales = given["quats"], given["scales"]
+        # A covariance that is flat to the last bit may be none after rounding: nearly flat is.
+        spread = torch.where(scales == 0, 1e-5, scales)
+        covars = covariances_of(quats, spread) if given_as == "covariances" else None
+        images, _, meta = draw(device, given, covars=covars)
+        images.sin().sum().backward()
+        found.append((images.detach(), *(leaf.grad for leaf in leaves)))
+        seen = set(meta["gaussian_ids"].tolist())
+        assert seen & {*range(0, COUNT, 3)} and seen & {*range(1, COUNT, 3)}
+    for ours, wanted in zip(*found, strict=True):
+        assert wanted.abs().max() > 0
+        assert (ours - wanted).abs().max() < 1e-3 * wanted.abs().max()
+    # What changes a flat one at second order alone has no gradient.
+    assert (found[0][2][1::3, 2] == 0).all()
+    points = scene()
+    points["scales"] = torch.zeros_like(points["scales"])
+    assert draw(device, points)[1].max() > 0.1

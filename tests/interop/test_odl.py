@@ -45,6 +45,55 @@ def test_the_adjoint_holds_between_weighted_spaces(device, odl):
     assert rift.dot_test(from_odl(P, device=device)) < 1e-6
 
 
+def spaces_of(odl, kind):
+    """A domain and a range whose inner products weigh samples unlike each other."""
+    if kind == "weights":
+        each = [1 + np.random.default_rng(3).random(shape) for shape in ((6, 7), (8, 9))]
+        return [odl.rn(w.shape, dtype="float32", weighting=np.float32(w)) for w in each]
+    if kind == "parts":
+        line = odl.uniform_discr(0, 3, 7, dtype="float32", nodes_on_bdry=True)
+        weighting = [1.0, 2, 3, 1, 2, 3]
+        return odl.ProductSpace(line, 6, weighting=weighting), odl.rn((8, 9), dtype="float32")
+    edge = {"dtype": "float32", "nodes_on_bdry": kind == "nodes" or [True, (False, True)]}
+    return (
+        odl.uniform_discr([-3, -3.5], [3, 3.5], (6, 7), **edge),
+        odl.uniform_discr([0, -4], [3, 4], (8, 9), **edge),
+    )
+
+
+@pytest.mark.each
+@pytest.mark.parametrize("kind", ["nodes", "one edge", "weights", "parts"])
+def test_the_adjoint_holds_where_samples_have_weights_of_their_own(device, odl, kind):
+    A, (domain, range) = projector(device), spaces_of(odl, kind)
+    P = to_odl(A, domain=domain, range=range)
+    x, y = domain.element(white(6, 7)), range.element(white(8, 9))
+    np.testing.assert_allclose(P(x).asarray(), A(white(6, 7)), rtol=1e-6)
+    assert np.isclose(P(x).inner(y), x.inner(P.adjoint(y)), rtol=1e-4)
+    again = P.adjoint.adjoint(x).asarray()
+    np.testing.assert_allclose(again, P(x).asarray(), rtol=1e-4, atol=1e-5)
+    # The other way round ODL's own operators keep one weight alone.
+    with pytest.raises(DTypeError, match="the domain of P has a weight for each sample"):
+        from_odl(P, device=device)
+
+
+def test_spaces_that_our_operators_know_nothing_of_are_refused(device, odl):
+    A = projector(device)
+    for space in (
+        odl.cn((6, 7)),
+        odl.uniform_discr([0, 0], [1, 1], (6, 7), dtype="complex64"),
+        odl.tensor_space((6, 7), dtype="int32"),
+    ):
+        with pytest.raises(DTypeError, match=f"domain is a space of {space.dtype}.*real"):
+            to_odl(A, domain=space)
+    with pytest.raises(DTypeError, match="range is a space of complex"):
+        to_odl(A, range=odl.cn((8, 9)))
+    own = odl.rn((8, 9), dtype="float32", inner=lambda x, y: 3.0)
+    with pytest.raises(DTypeError, match="range has a CustomInner as its inner product"):
+        to_odl(A, range=own)
+    with pytest.raises(DTypeError, match="domain has no inner product"):
+        to_odl(A, domain=odl.rn((6, 7), dtype="float32", exponent=1.0))
+
+
 def test_their_solver_takes_our_operator(device, odl):
     A, x = projector(device), white(6, 7)
     P = to_odl(A)

@@ -6,6 +6,7 @@ import sys
 
 import numpy as np
 import pytest
+import scipy.sparse.linalg
 from scipy.sparse.linalg import aslinearoperator as scipy_operator
 
 import rift_cl as rift
@@ -72,6 +73,14 @@ def test_what_cannot_be_an_operator_of_ours_is_named(device):
         from_pylops(scipy_operator(1j * np.eye(3)), device=device)
     with pytest.raises(DTypeError, match="A is a int"):
         to_pylops(3)
+
+
+def test_an_operator_of_scipy_without_an_adjoint_says_so_when_it_is_wanted(device):
+    given = scipy.sparse.linalg.LinearOperator((5, 5), matvec=lambda x: 2 * x, dtype=np.float32)
+    A, ones = from_pylops(given, device=device), np.ones(5, np.float32)
+    assert np.array_equal(A(ones), 2 * ones)
+    with pytest.raises(DTypeError, match=r"P is a .* without an adjoint.*rmatvec="):
+        A.T(ones)
 
 
 def test_a_wrong_adjoint_is_found_by_the_dot_test(device):

@@ -30,6 +30,9 @@ BAD = {
 }
 
 
+SIZES = (20, 30), (20.0, 30.0), torch.tensor([20, 30])
+
+
 @pytest.mark.parametrize("case", BAD)
 def test_what_cannot_be_drawn_is_named(device, case):
     changes, error, words = BAD[case]
@@ -56,5 +59,12 @@ def test_options_that_do_not_fit_are_named(device):
         render(tensors | {"covars": torch.zeros(60, 6)}, views, Ks, device=device)
     with pytest.raises(ShapeError, match="backgrounds"):
         render(tensors, views, Ks, backgrounds=torch.zeros(2, 4), device=device)
-    with pytest.raises(ShapeError, match="size"):
-        render(tensors, views, Ks, size=(0, 5), device=device)
+    for size in ((0, 5), (20.5, 30), (20, 30, 1), 20, ("tall", "wide")):
+        with pytest.raises(ShapeError, match="size"):
+            render(tensors, views, Ks, size=size, device=device)
+
+
+def test_whole_numbers_of_any_type_are_a_size(device):
+    tensors, (views, Ks) = tensors_of(scene()), map(torch.tensor, cameras())
+    images = [render(tensors, views, Ks, size=size, device=device)[0] for size in SIZES]
+    assert all(torch.equal(image, images[0]) for image in images[1:])

@@ -120,6 +120,48 @@ def test_lengths_are_in_one_unit_by_whatever_name():
     assert from_xarray(rows)[1].pitch == 0.25
 
 
+def volume_of_eight():
+    return to_xarray(values_of((8, 4, 6)), rift.Grid((8, 4, 6), 0.5, (1, 2, 3)), unit="mm")
+
+
+def in_micrometres(labelled):
+    """The same, its coordinates converted as people do: their attributes go along."""
+    return labelled.assign_coords(
+        {
+            axis: (axis, 1000 * labelled[axis].values, {**labelled[axis].attrs, "units": "um"})
+            for axis in labelled.dims
+        }
+    )
+
+
+def test_one_sample_that_is_left_of_several_does_not_tell_its_spacing():
+    whole = volume_of_eight()
+    assert from_xarray(whole.coarsen(z=4).mean())[1].spacing == (2.0, 0.5, 0.5)
+    for left in (
+        whole.coarsen(z=8).mean(),
+        whole.isel(z=slice(0, 7)).coarsen(z=7).mean(),
+        whole.isel(z=slice(0, None, 8)),
+        whole.isel(z=[3]),
+    ):
+        with pytest.raises(InputError, match=r"coordinate z has one sample.*array\.z\.attrs"):
+            from_xarray(left)
+        left.z.attrs["spacing"] = 4
+        assert from_xarray(left)[1].spacing == (4.0, 0.5, 0.5)
+
+
+def test_the_spacing_of_one_sample_has_a_unit_that_is_heeded():
+    one = to_xarray(values_of((1, 4, 6)), THINGS["one slice"][0], unit="mm")
+    assert one.z.attrs["spacing_units"] == "mm"
+    found = from_xarray(in_micrometres(one))[1]
+    assert np.allclose(found.spacing, (500, 300, 200))
+    # What nobody can convert is not guessed.
+    odd = one.assign_coords({axis: one[axis].assign_attrs(units="furlong") for axis in one.dims})
+    with pytest.raises(InputError, match=r"coordinate z is in furlong and its .* spacing in mm"):
+        from_xarray(odd)
+    bare = to_xarray(values_of((1, 4, 6)), THINGS["one slice"][0])
+    assert from_xarray(bare)[1].spacing == (0.5, pytest.approx(0.3), pytest.approx(0.2))
+
+
 def uneven(labelled):
     return labelled.assign_coords(x=np.arange(6.0) ** 2)
 

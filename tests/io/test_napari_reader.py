@@ -5,6 +5,7 @@ from __future__ import annotations
 import sys
 from pathlib import Path
 
+import h5py
 import numpy as np
 import pytest
 import yaml
@@ -84,6 +85,15 @@ def test_other_files_are_left_to_others(tmp_path):
 def test_a_file_that_is_not_there_is_named(tmp_path):
     with pytest.raises(RiftError, match=r"none\.zarr"):
         layer(tmp_path / "none.zarr")
+
+
+def test_a_scan_is_no_volume_and_what_is_advised_can_be_done(tmp_path):
+    with h5py.File(tmp_path / "scan.h5", "w") as file:
+        file["exchange/data"] = np.zeros((4, 1, 8), np.float32)
+    with pytest.raises(RiftError, match=r"scan\.h5: has no dataset '/volume'.*reconstruct") as told:
+        layer(tmp_path / "scan.h5")
+    # Whoever opens a file in napari has no options.
+    assert "dataset=" not in str(told.value)
 
 
 def test_the_manifest_names_what_there_is():

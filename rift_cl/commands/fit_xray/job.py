@@ -223,7 +223,8 @@ class XrayFit(FitRun[FitXraySettings]):
         shown = (slices, density * volume)
         notes = [*source.notes, *history_notes(self.metrics["history"])]
         name = source.scan.path.name
-        page = xray_page(name, shown, self.scores, self.losses, self.metrics, notes)
+        about = (self.scores, self.losses, self.metrics, notes, source.unit)
+        page = xray_page(name, shown, *about)
         self.folder.finish(self.settled, self.metrics, page, self.device, asked=settings)
 
     def _voxels(self, splats: Splats, whole: Projections) -> Floats:

@@ -36,6 +36,7 @@ def xray_page(
     losses: Sequence[tuple[int, float]],
     metrics: Mapping[str, Any],
     notes: Sequence[str] = (),
+    unit: str = "",
 ) -> Page:
     """The report of a finished fit.
 
@@ -46,10 +47,11 @@ def xray_page(
         losses: by step.
         metrics: the figures of the fit.
         notes: sentences about it.
+        unit: of the scan's lengths; empty where it is not known.
     """
     basis = f", {metrics['basis']}" if "basis" in metrics else ""
     page = Page(f"Splats fitted to {name}", f"{metrics['splats']} splats, X-rays{basis}")
-    _show_slices(page, *slices)
+    _show_slices(page, *slices, unit or "unit of length")
     if metrics["scores"]:
         page.section("Scores")
         page.table(COLUMNS, score_rows(metrics), caption=SCORING)
@@ -83,13 +85,13 @@ def _row(score: ViewScore) -> tuple[Any, ...]:
     return (score.name, score.angle, *(score.values[name] for name in names))
 
 
-def _show_slices(page: Page, splats: Floats, voxels: Floats) -> None:
+def _show_slices(page: Page, splats: Floats, voxels: Floats, unit: str) -> None:
     """Sliders through z and, of more than a few slices, through planes along the axis."""
     across = evenly(len(splats), min(len(splats), FRAMES))
     few = across[:: len(across) // 8 + 1]
     window = display_window([volume[k] for k in few for volume in (splats, voxels)])
     what = (
-        "Attenuation per unit of length: left of the splats, as means over voxels, right by "
+        f"Attenuation per {unit}: left of the splats, as means over voxels, right by "
         "filtered backprojection of the same views, or what stands in for it"
     )
     show_slices(

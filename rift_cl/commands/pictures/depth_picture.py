@@ -12,8 +12,7 @@ from functools import cache
 import numpy as np
 from numpy.typing import NDArray
 
-from rift_cl.commands.cameras.camera_path import resized
-from rift_cl.commands.pictures.evenly_spaced import evenly
+from rift_cl.commands.pictures.small_looks import small_looks
 from rift_cl.geometry import Camera
 from rift_cl.splat.renderer import Renderer
 from rift_cl.splat.splats import Splats
@@ -21,8 +20,6 @@ from rift_cl.splat.splats import Splats
 Floats = NDArray[np.float32]
 
 _COLORS = "viridis"
-# Cameras that are looked through to find out how deep a scene is, and how large their pictures are.
-_LOOKS, _EDGE = 8, 64
 # Share of the pixels that lie before or behind the window.
 _BEYOND = 0.02
 # Alpha above which a pixel's depth counts for the window.
@@ -45,13 +42,9 @@ def depth_window(
     Each of a few cameras has a window of its own, and the medians are taken, so that one that
     stands in a fog of wide splats does not take the colours from the others.
     """
-    observations = evenly(len(cameras), _LOOKS)
     windows = []
-    for number in observations:
-        camera = cameras[number]
-        share = min(1.0, _EDGE / max(camera.size))
-        size = max(1, round(share * camera.height)), max(1, round(share * camera.width))
-        depth, alpha = depth_and_alpha(renderer, splats, resized(camera, size))
+    for camera in small_looks(cameras):
+        depth, alpha = depth_and_alpha(renderer, splats, camera)
         if (alpha > _SOLID).any():
             windows.append(window_of(depth, alpha))
     if not windows:

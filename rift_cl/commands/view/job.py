@@ -14,6 +14,7 @@ from rift_cl.commands.view.browser_splats import MovingSplats, browser_can
 from rift_cl.commands.view.photographs import photographs_of
 from rift_cl.commands.view.settings import ViewSettings
 from rift_cl.commands.view.viewer import SplatViewer
+from rift_cl.commands.view.wish import kinds_of
 from rift_cl.io.captures.capture import View, as_pinholes, open_capture
 from rift_cl.progress import Report
 from rift_cl.splat.renderer import Renderer
@@ -50,6 +51,7 @@ class ViewJob:
             background=scene.background,
             light=scene.light,
             title=scene.name,
+            kinds=kinds_of(scene.rendering),
         )
 
     @property

@@ -28,7 +28,7 @@ from rift_cl.commands.view.pose import Pose
 from rift_cl.commands.view.standpoint import Standpoint
 from rift_cl.commands.view.view_panel import ViewPanel
 from rift_cl.commands.view.viser_camera import pose_of
-from rift_cl.commands.view.wish import KINDS, Wish
+from rift_cl.commands.view.wish import KINDS, Kind, Wish
 from rift_cl.errors import InputError
 
 _HOST = "127.0.0.1"
@@ -49,6 +49,7 @@ class ViewerPage:
         photographs: that may be jumped to.
         number: of the photograph at which a page opens.
         moving: whether a browser can draw while its camera moves.
+        kinds: of pictures that can be asked for.
         asked: called from viser's threads when a panel is changed.
 
     Raises:
@@ -66,6 +67,7 @@ class ViewerPage:
         photographs: Sequence[Photograph],
         number: int,
         moving: bool,
+        kinds: Sequence[Kind],
         asked: Callable[[], None],
     ) -> None:
         if not SMALLEST <= size <= LARGEST:
@@ -95,7 +97,7 @@ class ViewerPage:
             show_logo=False, show_share_button=False, control_width="small"
         )
         self._begin_at(first)
-        self.view = ViewPanel(self._server, size, first, asked, moving=moving)
+        self.view = ViewPanel(self._server, size, first, asked, moving=moving, kinds=kinds)
         reach = float(np.linalg.norm(first.target - first.position))
         opening = photographs[number].camera.aperture if photographs else None
         self.lens = LensPanel(self._server, reach, opening, asked)
@@ -178,7 +180,7 @@ class ViewerPage:
         client.flush()
 
     def tell(self, facts: str) -> None:
-        """What the panel says about the last picture."""
+        """What the panel says about the last picture, in plain lines."""
         with sending():
             self.view.tell(facts)
 

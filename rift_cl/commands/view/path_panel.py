@@ -12,6 +12,7 @@ import numpy as np
 
 from rift_cl.commands.cameras.camera_path import smooth_path
 from rift_cl.commands.view.lens_panel import LensPanel
+from rift_cl.commands.view.markdown import markdown_of
 from rift_cl.commands.view.pose import Pose
 from rift_cl.commands.view.standpoint import Standpoint
 from rift_cl.commands.view.viser_camera import go, pose_of
@@ -153,6 +154,6 @@ class PathPanel:
 
     def _tell(self) -> None:
         count = len(self._keys)
-        self._count.content = (
-            f"{count} key frames; `rift render --path path.json` draws what is exported"
+        self._count.content = markdown_of(
+            f"{count} key frames; 'rift render --path path.json' draws what is exported"
         )

@@ -10,6 +10,7 @@ import numpy as np
 
 from rift_cl.commands.inputs.scene_bounds import SceneBounds
 from rift_cl.commands.view.lens_panel import LensPanel
+from rift_cl.commands.view.markdown import markdown_of
 from rift_cl.commands.view.photographs import COMPARISONS, Comparison, Photograph
 from rift_cl.commands.view.standpoint import standpoint_of
 from rift_cl.commands.view.viser_camera import go, wxyz_of
@@ -67,7 +68,7 @@ class PhotographPanel:
     def _fill(self, gui: Any) -> None:
         """Put everything into the panel."""
         count = len(self._photographs)
-        self._name = gui.add_markdown(self._photographs[self._number].name)
+        self._name = gui.add_markdown(markdown_of(self._photographs[self._number].name))
         step = gui.add_button_group("photograph", ("previous", "go", "next"))
         self._how = gui.add_dropdown(
             "compare",
@@ -100,7 +101,7 @@ class PhotographPanel:
         self._frusta[self._number].color = _COLOR
         self._frusta[number].color = _CHOSEN
         self._number = number
-        self._name.content = self._photographs[number].name
+        self._name.content = markdown_of(self._photographs[number].name)
         aspect = client.camera.aspect
         camera, bounds = self._photographs[number].camera, self._bounds
         go(client, standpoint_of(camera, bounds.center, bounds.up, aspect))

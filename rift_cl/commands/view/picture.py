@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from rift_cl.commands.cameras.film_path import film
 from rift_cl.commands.inputs.opened_scene import in_display_light
 from rift_cl.commands.inputs.scene_bounds import SceneBounds
-from rift_cl.commands.pictures.depth_picture import depth_and_alpha, depth_picture, window_of
+from rift_cl.commands.pictures.depth_picture import depth_and_alpha, depth_picture, depth_window
+from rift_cl.commands.pictures.small_looks import LOOKS, small_looks
 from rift_cl.commands.view.crop import Crop, cropped
 from rift_cl.commands.view.photographs import Photograph, compared, seen_by, taken_from
 from rift_cl.commands.view.wish import KINDS, Wish
@@ -21,14 +24,18 @@ from rift_cl.splat.splats import Splats
 
 Floats = NDArray[np.float32]
 
-# Share of the line integrals of X-rays that is darker than white.
+# Share of the line integrals of X-rays, of those that are not 0, that is darker than white.
 _WHITE = 0.995
+# What an orbit sees by which scales are chosen where nobody knows the scene's cameras.
+_SIZE, _FOV = (64, 64), 45.0
 
 
 class Painter:
     """Draws what is wished for, and keeps what the next picture may be made of.
 
     ``drawn`` counts how often splats were drawn; ``trouble`` says what the last picture lacks.
+    Scales of grey and of depth go by what the scene's cameras see, and not by what a page does: the
+    same pose gives the same picture, whoever looked from where before.
 
     Args:
         background: (3,) behind the splats, in their light.
@@ -40,6 +47,7 @@ class Painter:
         self._background, self._light = background, light
         distance = bounds.distance
         self._reach = bounds.radius if distance is None else distance
+        self._cameras = bounds.cameras or film(bounds, frames=LOOKS, size=_SIZE, fov=_FOV)
         self.drawn, self.trouble = 0, ""
         # The splats in a box, what was drawn last, and the photograph as it was seen last.
         self._kept: dict[str, tuple[Any, Any]] = {}
@@ -82,14 +90,17 @@ class Painter:
         inside = self._known("crop", (crop, version), lambda: cropped(splats, crop, device))
         if renderer.settings.mode == "xray":
             integrals = device.get(renderer.forward(inside, camera).image)[..., :3]
-            most = self._known("most", version, lambda: _most(integrals))
-            return np.asarray(np.clip(integrals / most, 0, 1))
+            white = self._known("white", version, lambda: _white(renderer, splats, self._cameras))
+            return np.asarray(np.clip(integrals / white, 0, 1))
         if kind == KINDS[0]:
             behind = device.array(self._background)
             frame = renderer.forward(inside, camera, background=behind)
             return in_display_light(device.get(frame.image)[..., :3], self._light)
         depth, alpha = depth_and_alpha(renderer, inside, camera)
-        return depth_picture(depth, alpha, window_of(depth, alpha))
+        window = self._known(
+            "window", version, lambda: depth_window(renderer, splats, self._cameras)
+        )
+        return depth_picture(depth, alpha, window)
 
     def _known(self, what: str, key: Any, make: Any) -> Any:
         """What was made for this key, or is made now."""
@@ -98,9 +109,17 @@ class Painter:
         return self._kept[what][1]
 
 
-def _most(integrals: Floats) -> float:
-    """The line integral that is drawn white: nearly the largest, or 1 where there are none."""
-    return float(np.quantile(integrals, _WHITE)) or 1.0
+def _white(renderer: Renderer, splats: Splats, cameras: Sequence[Camera]) -> float:
+    """The line integral that is drawn white: nearly the largest that cameras see, or 1."""
+    most = 0.0
+    for camera in small_looks(cameras):
+        # X-rays go through no lens.
+        pinhole = Camera(camera.size, camera.K, camera.view, camera.model)
+        integrals = renderer.device.get(renderer.forward(splats, pinhole).image)[..., :3]
+        seen = integrals[integrals > 0]
+        if seen.size:
+            most = max(most, float(np.quantile(seen, _WHITE)))
+    return most or 1.0
 
 
 def _observed(photograph: Photograph, camera: Camera) -> Any:

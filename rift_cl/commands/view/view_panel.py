@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
 
+from rift_cl.commands.view.markdown import markdown_of
 from rift_cl.commands.view.standpoint import Standpoint
 from rift_cl.commands.view.viser_camera import go, pose_of
-from rift_cl.commands.view.wish import KINDS, Kind
+from rift_cl.commands.view.wish import Kind
 
 _DRAWN_BY = ("browser", "rift")
 _RESET, _UPRIGHT = "reset view", "set up"
@@ -25,6 +26,7 @@ class ViewPanel:
         first: the standpoint that 'reset view' returns to.
         asked: called when anything is changed.
         moving: whether a browser can draw while its camera moves.
+        kinds: of pictures that can be asked for, the first one to begin with.
     """
 
     def __init__(
@@ -35,10 +37,11 @@ class ViewPanel:
         asked: Callable[[], None],
         *,
         moving: bool,
+        kinds: Sequence[Kind],
     ) -> None:
-        self._server, self._first = server, first
+        self._server, self._first, self._kinds = server, first, kinds
         gui = server.gui
-        self._kind = gui.add_dropdown("show", KINDS, initial_value=KINDS[0])
+        self._kind = gui.add_dropdown("show", kinds, initial_value=kinds[0], visible=len(kinds) > 1)
         self._size = gui.add_slider(
             "size",
             min=_SMALLEST,
@@ -81,9 +84,9 @@ class ViewPanel:
 
     @property
     def kind(self) -> Kind:
-        """Which of ``KINDS`` is to be shown."""
+        """Which of the kinds is to be shown."""
         kind = self._kind.value
-        return kind if kind in KINDS else KINDS[0]
+        return kind if kind in self._kinds else self._kinds[0]
 
     @property
     def browser_draws(self) -> bool:
@@ -96,8 +99,8 @@ class ViewPanel:
         return int(np.clip(self._size.value, _SMALLEST, _LARGEST))
 
     def tell(self, facts: str) -> None:
-        """What the panel says about the last picture."""
-        self._facts.content = facts
+        """What the panel says about the last picture, in plain lines."""
+        self._facts.content = markdown_of(facts)
 
     def _set_up(self, client: Any) -> None:
         """Take the page's own upright for the scene's."""
@@ -107,5 +110,5 @@ class ViewPanel:
         up = -pose.camera(_SMALLEST).view[1, :3]
         self._server.scene.set_up_direction(tuple(up.tolist()))
         client.camera.up_direction = up
-        self._up.content = "`--up " + " ".join(f"{part:.4f}" for part in up) + "`"
+        self._up.content = markdown_of("--up " + " ".join(f"{part:.4f}" for part in up))
         self._up.visible = True

@@ -29,7 +29,7 @@ from rift_cl.commands.view.photographs import Photograph, nearest_one
 from rift_cl.commands.view.picture import Painter
 from rift_cl.commands.view.pose import NARROWEST, Pose
 from rift_cl.commands.view.standpoint import standpoint_of
-from rift_cl.commands.view.wish import Wish
+from rift_cl.commands.view.wish import KINDS, Kind, Wish
 from rift_cl.errors import InputError, RiftError
 from rift_cl.geometry import Camera
 from rift_cl.io.images.display_light import LightKind
@@ -123,6 +123,7 @@ class SplatViewer:
         background: (3,) behind the splats, in their light; black if not given.
         light: that the splats' colours are in.
         title: above the panel.
+        kinds: of pictures that a page can ask for.
 
     Raises:
         InputError: viser is not installed, or the port cannot be had.
@@ -139,6 +140,7 @@ class SplatViewer:
         background: ArrayLike | None = None,
         light: LightKind = "display",
         title: str = "RiFT",
+        kinds: Sequence[Kind] = KINDS,
     ) -> None:
         behind = np.zeros(3) if background is None else background
         self._background = np.asarray(behind, np.float32)
@@ -160,6 +162,7 @@ class SplatViewer:
             photographs=photographs,
             number=nearest_one(photographs, first),
             moving=moving is not None,
+            kinds=kinds,
             asked=self._asked.set,
         )
         self._page.watch(self._joined, self._moved, self._left)
@@ -264,7 +267,7 @@ class SplatViewer:
                 client.splats[0].visible = client.alone = False
 
     def _facts(self, splats: Splats, camera: Camera, seconds: float) -> str:
-        """What the panel says: lines of Markdown."""
+        """What the panel says, in plain lines."""
         arrays = [array for array in vars(splats).values() if array is not None]
         megabytes = sum(array.nbytes for array in arrays) / 2**20
         lines = [
@@ -273,7 +276,7 @@ class SplatViewer:
             f"{1 / max(seconds, 1e-6):.3g} pictures a second",
             *filter(None, [self.state, self._painter.trouble]),
         ]
-        return "  \n".join(lines)
+        return "\n".join(lines)
 
     def _joined(self, handle: Any, pose: Pose) -> None:
         with self._lock:

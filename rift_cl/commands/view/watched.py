@@ -8,6 +8,7 @@ from rift_cl.commands.fit_photos.pictures import CapturePictures
 from rift_cl.commands.inputs.scene_bounds import bounds_of_cameras
 from rift_cl.commands.view.photographs import photographs_in_work
 from rift_cl.commands.view.viewer import SplatViewer
+from rift_cl.commands.view.wish import kinds_of
 from rift_cl.progress import Report
 from rift_cl.train.trainer import Trainer
 
@@ -69,6 +70,7 @@ class _Window:
             background=pictures.behind,
             light=pictures.light,
             title=title,
+            kinds=kinds_of(self._trainer.renderer.settings),
         )
         self._announce(f"{self._viewer.url} shows the fit")
 

@@ -8,9 +8,15 @@ from typing import Literal
 from rift_cl.commands.view.crop import Crop
 from rift_cl.commands.view.photographs import Comparison, Photograph
 from rift_cl.geometry import Aperture
+from rift_cl.splat.settings import SplatSettings
 
 Kind = Literal["colour", "depth"]
 KINDS: tuple[Kind, ...] = ("colour", "depth")
+
+
+def kinds_of(settings: SplatSettings) -> tuple[Kind, ...]:
+    """What can be shown of splats that are rendered so: nothing is before anything in X-rays."""
+    return KINDS[:1] if settings.mode == "xray" else KINDS
 
 
 @dataclass(frozen=True)

@@ -6,13 +6,14 @@ import math
 from contextlib import AbstractContextManager
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 import h5py
 import numpy as np
 
 from rift_cl.errors import ShapeError
 from rift_cl.io.boundary import check_claim, check_numeric
-from rift_cl.io.hdf5_tree import open_tree
+from rift_cl.io.hdf5_tree import Hdf5Tree, open_tree
 from rift_cl.io.volumes.layout import Floats, VolumeLayout, VolumePlace, WriteSlab
 from rift_cl.io.volumes.plain_samples import staged_samples
 from rift_cl.io.volumes.sample_window import restored
@@ -33,7 +34,7 @@ def staged_volume(path: Path, layout: VolumeLayout) -> AbstractContextManager[Wr
 def load_volume(path: Path, *, budget: int | None) -> Floats:
     """Read the dataset whole."""
     with open_tree(path) as tree:
-        dataset = tree.dataset(f"/{_DATASET}")
+        dataset = _volume_in(tree)
         check_numeric(path, _DATASET, dataset.dtype)
         if dataset.shape is None or len(dataset.shape) != 3 or 0 in dataset.shape:
             raise ShapeError(f"{path}: /{_DATASET} has shape {dataset.shape}, wanted (z, y, x)")
@@ -50,7 +51,16 @@ def load_volume(path: Path, *, budget: int | None) -> Floats:
 def load_place(path: Path) -> VolumePlace:
     """What the dataset's attributes say of where its samples stand."""
     with open_tree(path) as tree:
-        return VolumePlace.of(tree.dataset(f"/{_DATASET}").attrs)
+        return VolumePlace.of(_volume_in(tree).attrs)
+
+
+def _volume_in(tree: Hdf5Tree) -> Any:
+    """The dataset of a volume.
+
+    Raises:
+        FileFormatError: there is none; the error lists those that there are.
+    """
+    return tree.dataset(f"/{_DATASET}", remedy="a scan becomes a volume by 'rift reconstruct'")
 
 
 def _write_header(layout: VolumeLayout, part: Path) -> int:
