@@ -23,14 +23,21 @@ class LensPanel:
         reach: distance to what is looked at, in scene units.
         aperture: that pages begin with; None for a pinhole.
         asked: called when anything is changed.
+        visible: whether pages show the panel.
     """
 
     def __init__(
-        self, server: Any, reach: float, aperture: Aperture | None, asked: Callable[[], None]
+        self,
+        server: Any,
+        reach: float,
+        aperture: Aperture | None,
+        asked: Callable[[], None],
+        *,
+        visible: bool = True,
     ) -> None:
         self._reach = reach
         gui = server.gui
-        with gui.add_folder("lens", expand_by_default=False):
+        with gui.add_folder("lens", expand_by_default=False, visible=visible):
             self._radius = gui.add_slider(
                 "aperture",
                 min=0.0,

@@ -100,7 +100,9 @@ class ViewerPage:
         self.view = ViewPanel(self._server, size, first, asked, moving=moving, kinds=kinds)
         reach = float(np.linalg.norm(first.target - first.position))
         opening = photographs[number].camera.aperture if photographs else None
-        self.lens = LensPanel(self._server, reach, opening, asked)
+        # What has no depth was taken through no lens.
+        lens = "depth" in kinds
+        self.lens = LensPanel(self._server, reach, opening, asked, visible=lens)
         given = (self._server, photographs, number, bounds, self.lens)
         self.photographs = PhotographPanel(*given, asked)
         self.crop = CropPanel(self._server, bounds, asked)

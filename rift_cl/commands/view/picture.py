@@ -64,7 +64,9 @@ class Painter:
             wish: what the page asks for.
             version: changes whenever the splats do.
         """
-        lensed = Camera(camera.size, camera.K, camera.view, camera.model, wish.aperture)
+        # X-rays go through no lens.
+        aperture = None if renderer.settings.mode == "xray" else wish.aperture
+        lensed = Camera(camera.size, camera.K, camera.view, camera.model, aperture)
         key = (lensed, wish.kind, wish.crop, version)
         drawn = self._known("drawn", key, lambda: self._drawn(splats, renderer, *key))
         photograph, self.trouble = wish.photograph, ""
