@@ -38,6 +38,7 @@ import sys
 import zlib
 from collections import Counter
 from collections.abc import Iterable
+from pathlib import Path
 
 import pytest
 
@@ -75,7 +76,7 @@ def pytest_cmdline_main(config: pytest.Config) -> None:
     config.selection = told or marked or ("named" if named else "plain")
     # Whether every test of the selection runs, so that what none of them touched is a fault.
     config.whole = config.selection in ("plain", "full") and not named
-    if config.selection != "named" and told is None:
+    if told is None and (config.selection != "named" or _names_a_folder(config)):
         _use_all_cores(config)
 
 
@@ -85,6 +86,12 @@ def _named(config: pytest.Config) -> bool:
     by_path = config.args_source is pytest.Config.ArgsSource.ARGS
     words = (option.keyword, option.markexpr, option.deselect, getattr(option, "lf", False))
     return bool(by_path or any(words))
+
+
+def _names_a_folder(config: pytest.Config) -> bool:
+    """Whether the tests that the command line names are those of a whole folder, which are many."""
+    by_path = config.args_source is pytest.Config.ArgsSource.ARGS
+    return by_path and any(Path(each).is_dir() for each in config.args)
 
 
 def _use_all_cores(config: pytest.Config) -> None:

@@ -57,6 +57,7 @@ ELSEWHERE = {
     "--durations",
     "--costs",
     "--preload",
+    "--index-url",
 }
 
 
