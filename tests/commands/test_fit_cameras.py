@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import shutil
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -104,9 +105,12 @@ def test_lenses_masks_and_points_come_back(tmp_path):
     for number, (model, names) in enumerate(LENS_MODELS.items()):
         lens = Lens(model, tuple(0.01 * k for k in range(1, len(names) + 1)), camera.K)
         views = views_of(photographs, ring(6), lens=lens, mask=mask)
+        circle = 3.5 if model.endswith("_FISHEYE") else None
+        views = tuple(replace(view, crop_radius=circle) for view in views)
         whole = Capture(views, points, colors, tmp_path, 0.75)
         found = saved(tmp_path / f"fit{number}", whole, photographs=9)
         assert all(view.lens == lens for view in found.views), model
+        assert all(view.crop_radius == circle for view in found.views), model
         assert all(view.mask.resolve() == mask for view in found.views)
         assert found.views[2].image == photographs / "2.png"
         np.testing.assert_array_equal(found.points, points)
