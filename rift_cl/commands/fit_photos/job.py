@@ -13,6 +13,7 @@ from rift_cl.commands.export.fit_page import leave_page
 from rift_cl.commands.fit.probe import TRIED, probed, time_words
 from rift_cl.commands.fit.run import FitRun
 from rift_cl.commands.fit_photos.bare_input import BareInput
+from rift_cl.commands.fit_photos.comparison import compared_record, comparison_notes
 from rift_cl.commands.fit_photos.photograph_size import fitting_downscale, size_words
 from rift_cl.commands.fit_photos.pictures import CapturePictures
 from rift_cl.commands.fit_photos.pose_check import check_poses
@@ -241,11 +242,16 @@ class Fit(FitRun[FitPhotosSettings]):
             **settings.basis_facts(),
             **({} if trainer.octaves is None else {"octaves": trainer.octaves.facts()}),
             **score_record(self.scores),
+            **compared_record(self.scores),
             **error_record(self.scores),
         }
         ramp = ramp_notes(settings, len(self.training_views))
         held_out = self.scores.get("held out", [])
-        doubts = [*brightness_notes(settings, held_out), *doubt_notes(held_out)]
+        doubts = [
+            *comparison_notes(self.scores),
+            *brightness_notes(settings, held_out),
+            *doubt_notes(held_out),
+        ]
         for note in doubts:
             self.announce(f"rift: {note}")
         octaves = octave_notes(self.metrics)
