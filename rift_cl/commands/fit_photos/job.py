@@ -14,7 +14,11 @@ from rift_cl.commands.fit.probe import TRIED, probed, time_words
 from rift_cl.commands.fit.run import FitRun
 from rift_cl.commands.fit_photos.bare_input import BareInput
 from rift_cl.commands.fit_photos.comparison import compared_record, comparison_notes
-from rift_cl.commands.fit_photos.photograph_size import fitting_downscale, size_words
+from rift_cl.commands.fit_photos.photograph_size import (
+    check_window,
+    fitting_downscale,
+    size_words,
+)
 from rift_cl.commands.fit_photos.pictures import CapturePictures
 from rift_cl.commands.fit_photos.pose_check import check_poses
 from rift_cl.commands.fit_photos.report import (
@@ -92,6 +96,8 @@ class Fit(FitRun[FitPhotosSettings]):
         }
         if len(self.tests) < len(settings.test):
             raise InputError("--test names two captures of the same name: rename one folder")
+        if isinstance(self.source, Capture):
+            self._check_sizes()
 
     def plan(self) -> dict[str, str]:
         """What would be done, by name."""
@@ -179,6 +185,7 @@ class Fit(FitRun[FitPhotosSettings]):
         if isinstance(capture, BareInput):
             capture = yield from capture.find()
             self._split(capture)
+            self._check_sizes()
         for note in self._notes():
             self.announce(f"rift: {note}")
         pictures = self._pictures(self.training_views)
@@ -304,6 +311,12 @@ class Fit(FitRun[FitPhotosSettings]):
         )
         decided = self.checkpoints.decided.get("downscale")
         self.downscale = decided or fitting_downscale(self.training_views, self.device)
+
+    def _check_sizes(self) -> None:
+        """Make sure that SSIM can be had of all photographs that it is asked of."""
+        in_loss = self.training_views if self.settings.training.ssim_weight else ()
+        scored = (view for views in self._scored().values() for view in views)
+        check_window([*in_loss, *scored], self.downscale)
 
     def _notes(self) -> list[str]:
         """What was decided about the photographs, and what of them is not used."""
