@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from test_start import MIDDLE_OF_RING, ring
 
+from rift_cl.commands.cameras.arc import place_notes
 from rift_cl.commands.cameras.fit_cameras import open_fit_cameras, save_fit_cameras
 from rift_cl.commands.cameras.photograph_place import place_record
 from rift_cl.commands.cli import main
@@ -233,6 +234,17 @@ def test_cameras_in_one_place_tell_no_depth_and_nothing_is_written(capture, tmp_
     assert main(["fit", str(place), "--out", str(tmp_path / "fit")]) == 3
     assert "all 8 cameras stand in one place" in capsys.readouterr().err
     assert not (tmp_path / "fit").exists()
+
+
+def test_a_single_photograph_is_told_to_tell_no_depth(capture, tmp_path, capsys):
+    place = tmp_path / "photograph"
+    shutil.copytree(capture, place)
+    record = json.loads((place / "transforms.json").read_text())
+    record["frames"] = record["frames"][:1]
+    (place / "transforms.json").write_text(json.dumps(record))
+    assert main(["fit", str(place), "--out", str(tmp_path / "fit"), "--dry-run"]) == 0
+    assert "tells nothing of depth" in " ".join(capsys.readouterr().out.split())
+    assert not place_notes(ring(2)) and not place_notes([])
 
 
 def test_the_arc_is_what_the_cameras_covered(tmp_path):

@@ -6,7 +6,7 @@ import dataclasses
 import time
 from collections.abc import Iterator
 
-from rift_cl.commands.cameras.arc import check_places
+from rift_cl.commands.cameras.arc import check_places, place_notes
 from rift_cl.commands.cameras.fit_cameras import CAMERA_FILES, save_fit_cameras, with_poses
 from rift_cl.commands.cameras.photograph_place import place_record
 from rift_cl.commands.export.fit_page import leave_page
@@ -298,8 +298,8 @@ class Fit(FitRun[FitPhotosSettings]):
         settings = self.settings
         # Poses that are found here come with a sentence of how good they are.
         few = [] if isinstance(self.source, BareInput) else start_notes(capture)
-        self.capture_notes = (*capture.notes, *few)
         cameras = [view.camera for view in capture.views]
+        self.capture_notes = (*capture.notes, *few, *place_notes(cameras))
         check_places(cameras, settings.capture)
         check_poses(cameras, capture.points, settings.capture)
         self.hold_out = settings.hold_out
