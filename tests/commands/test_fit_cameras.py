@@ -17,6 +17,7 @@ from rift_cl.commands.cli import main
 from rift_cl.errors import FileFormatError, InputError
 from rift_cl.geometry.lens_distortion import LENS_MODELS, Lens
 from rift_cl.io.captures.capture import Capture, View, open_capture
+from rift_cl.io.images.image import write_png
 from rift_cl.io.output import write_json
 
 
@@ -245,6 +246,29 @@ def test_a_single_photograph_is_told_to_tell_no_depth(capture, tmp_path, capsys)
     assert main(["fit", str(place), "--out", str(tmp_path / "fit"), "--dry-run"]) == 0
     assert "tells nothing of depth" in " ".join(capsys.readouterr().out.split())
     assert not place_notes(ring(2)) and not place_notes([])
+
+
+def test_a_fit_that_is_refused_before_it_begins_leaves_no_folder(capture, tmp_path, capsys):
+    """Cameras that look outward, without points: that is found when the work begins."""
+    place, out = tmp_path / "photographs", tmp_path / "fit"
+    shutil.copytree(capture, place)
+    record = json.loads((place / "transforms.json").read_text())
+    for number, frame in enumerate(record["frames"]):
+        turn = 2 * np.pi * number / 8
+        outward = np.array([np.cos(turn), np.sin(turn), 0])
+        right = np.array([-np.sin(turn), np.cos(turn), 0])
+        pose = np.eye(4)
+        pose[:3] = np.stack([right, [0, 0, 1], -outward, 0.1 * outward], axis=1)
+        pose[:3, 0] *= np.sign(np.linalg.det(pose[:3, :3]))
+        frame["transform_matrix"] = pose.tolist()
+        image = np.random.default_rng(number).integers(0, 256, (60, 80, 3)).astype(np.uint8)
+        write_png(place / frame["file_path"], image)
+    (place / "transforms.json").write_text(json.dumps(record))
+    assert main(["fit", str(place), "--out", str(out), "--steps", "2", "--quiet"]) == 3
+    refused = capsys.readouterr().err
+    assert refused.count("\n") == 1 and not out.exists()
+    words = ["--steps", "2", "--splats", "50", "--quiet"]
+    assert main(["fit", str(capture), "--out", str(out), *words]) == 0
 
 
 def test_the_arc_is_what_the_cameras_covered(tmp_path):

@@ -173,12 +173,7 @@ class Fit(FitRun[FitPhotosSettings]):
             words.append(f"harmonics of degree {training.degree}")
         return ", ".join([*words, *filter(None, [self.settings.basis_words()])])
 
-    def run(self) -> Iterator[Report]:
-        """Do it; a report now and then.
-
-        Raises:
-            StoppedError: ``stop`` was called; a checkpoint was kept.
-        """
+    def _work(self) -> Iterator[Report]:
         settings = self.settings
         self.folder.make()
         capture = self.source
