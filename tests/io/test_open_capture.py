@@ -154,6 +154,21 @@ def test_lines_of_features_may_be_left_out(tmp_path: Path, left_out: tuple[int, 
     check_cameras(open_capture(tmp_path))
 
 
+def test_names_of_several_words_that_end_in_a_number_in_a_text_model(tmp_path: Path) -> None:
+    """Such a line has as many words as one of features may have, and ends as that does."""
+    path = made.colmap_text(tmp_path) / "images.txt"
+    text = path.read_text()
+    for name, other in zip(made.NAMES, ("shot a 1", "shot a 2", "a b c d e 3"), strict=True):
+        text = text.replace(name, other)
+    kept = [line for k, line in enumerate(text.split("\n\n", 1)[1].split("\n")) if k % 2 == 0]
+    path.write_text("\n".join(kept))
+    views = open_capture(tmp_path, photographs=False).views
+    assert [view.name for view in views] == ["a b c d e 3", "shot a 1", "shot a 2"]
+    path.write_text(text)
+    again = open_capture(tmp_path, photographs=False).views
+    assert [view.name for view in again] == [view.name for view in views]
+
+
 def test_a_name_that_is_a_number_in_a_text_model(tmp_path: Path) -> None:
     path = made.colmap_text(tmp_path) / "images.txt"
     lines = [line for line in path.read_text().replace("a.png", "0001").split("\n") if line]
