@@ -3,6 +3,7 @@
  *     color = max(sum over k of B_k(direction; lobes) linear[k] + 1/2, 0),
  *     direction = mean - camera, unit,
  *
+ * and the camera's axis where its rays are parallel (PARALLEL 1, which center then holds),
  * B_0 the constant of the harmonics and the others as include/shading/lobe*.h derive them: modes on a
  * chart, or spherical Gaussians. Splats that are not drawn are black, and so are those whose
  * numbers give no finite colour or whose lobes point nowhere (black ones pass no gradient on, so

@@ -1,6 +1,8 @@
 /* Colours of splats seen from where the camera stands: spherical harmonics of the direction.
  *
- *     color = max(sum over k of Y_k(direction) sh[k] + 1/2, 0),   direction = mean - camera, unit.
+ *     color = max(sum over k of Y_k(direction) sh[k] + 1/2, 0),   direction = mean - camera, unit,
+ *
+ * and the camera's axis where its rays are parallel (PARALLEL 1, which center then holds).
  *
  * Splats that are not drawn are black, and so are those whose coefficients give no finite colour
  * (black ones pass no gradient on, so that they spoil nothing else). The colour is written to the

@@ -344,12 +344,12 @@ def _fitted(job: Any, table: Any, output: Output) -> bool:
 def _eval(settings: Any, output: Output) -> None:
     from rift_cl.commands.evaluate.job import Evaluation
     from rift_cl.commands.evaluate.report import score_table
-    from rift_cl.commands.fit_photos.report import SCORING
 
     job = Evaluation(settings)
     if not ran(job, settings, output):
         return
-    print_table(*score_table(job.metrics), caption=SCORING)
+    columns, rows, caption = score_table(job.metrics)
+    print_table(columns, rows, caption=caption)
     _print_notes(job.notes)
     print(f"report.html and metrics.json are in {settings.out}")
 

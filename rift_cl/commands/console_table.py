@@ -12,8 +12,14 @@ from rich.table import Table
 def print_table(
     columns: Sequence[str], rows: Iterable[Sequence[Any]], *, caption: str = ""
 ) -> None:
-    """Print a table; numbers have four digits that count."""
+    """Print a table; numbers have four digits that count, and None is a dash."""
     table = Table(*columns, caption=caption or None, caption_justify="left")
     for row in rows:
-        table.add_row(*(f"{cell:.4g}" if isinstance(cell, float) else str(cell) for cell in row))
+        table.add_row(*map(_text, row))
     Console().print(table)
+
+
+def _text(cell: Any) -> str:
+    if cell is None:
+        return "\N{EN DASH}"
+    return f"{cell:.4g}" if isinstance(cell, float) else str(cell)

@@ -38,7 +38,8 @@ class Camera:
         K: (3, 3) intrinsics ``[[fx, 0, cx], [0, fy, cy], [0, 0, 1]]`` in pixels; for ``ortho``
             fx and fy are pixels per unit of length. Kept as a read-only float64 array.
         view: (4, 4) world-to-camera matrix, a rotation and a shift. Kept as ``K`` is.
-        model: ``pinhole``; ``ortho`` (parallel rays); ``fisheye`` (equidistant: the distance
+        model: ``pinhole``; ``ortho`` (parallel rays, so that colours that depend on the direction
+            are those along the camera's axis); ``fisheye`` (equidistant: the distance
             from the principal point is proportional to the angle from the axis).
         aperture: the opening of a thin lens, for a pinhole camera that is sharp at one depth;
             None for one that is sharp everywhere.
@@ -128,6 +129,14 @@ class Camera:
         center = np.asarray(-np.linalg.solve(self.view[:3, :3], self.view[:3, 3]), np.float64)
         center.flags.writeable = False
         return center
+
+    @cached_property
+    def axis(self) -> NDArray[np.float64]:
+        """Where the camera looks, a unit vector (3,) in world coordinates; read-only."""
+        forward = self.view[2, :3]
+        axis = np.asarray(forward / np.linalg.norm(forward), np.float64)
+        axis.flags.writeable = False
+        return axis
 
 
 def image_size(size: Sequence[int]) -> tuple[int, int]:

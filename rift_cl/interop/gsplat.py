@@ -101,7 +101,8 @@ def rasterization(
         rasterize_mode: ``classic`` or ``antialiased``.
         channel_chunk: changes nothing.
         distributed: not supported.
-        camera_model: ``pinhole``, ``ortho`` or ``fisheye``.
+        camera_model: ``pinhole``, ``ortho`` or ``fisheye``. Harmonics are those of the directions
+            from where a camera stands, as in gsplat; our own ``ortho`` sees along its axis.
         segmented: changes nothing.
         covars: (..., N, 3, 3) covariances in place of ``quats`` and ``scales``.
         with_ut: not supported.

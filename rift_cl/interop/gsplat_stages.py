@@ -5,7 +5,7 @@ Tensors of images are flat in what follows: (B C, N, ...), batch after batch.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import prod
 from typing import Any, NamedTuple
 
@@ -78,8 +78,11 @@ def color_all(scene: Scene, colors: Any, screens: Screens, sh_degree: int | None
             f"{(sh_degree + 1) ** 2} (degrees are 0 to 4)"
         )
     used, culled = colors[..., : (sh_degree + 1) ** 2, :], screens.culled.reshape(B, C, N)
+    # gsplat takes directions from where a camera stands, also where rays are parallel: those of a
+    # pinhole at the same place.
+    how = replace(scene.how, model="pinhole") if scene.how.model == "ortho" else scene.how
     seen = [
-        shade(scene.how, like[number], used[number], *scene.views(number), culled[number])
+        shade(how, like[number], used[number], *scene.views(number), culled[number])
         for number in range(B)
     ]
     return torch.cat(seen)

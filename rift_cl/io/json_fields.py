@@ -57,6 +57,18 @@ class Fields:
             raise NonFiniteError(f"{self.where}: {name!r} is {value}, wanted a finite number")
         return number
 
+    def numbers(self, name: str) -> list[float] | None:
+        """A list of finite numbers, or None; errors are those of ``number``."""
+        if name not in self:
+            return None
+        values = self.values[name]
+        if not (isinstance(values, list) and all(_is_number(value) for value in values)):
+            raise self._wrong(name, "a list of numbers")
+        numbers = [float(value) for value in values]
+        if not np.isfinite(numbers).all():
+            raise NonFiniteError(f"{self.where}: {name!r} is {values}, wanted finite numbers")
+        return numbers
+
     def whole(self, name: str) -> int | None:
         """A positive whole number, or None; errors are those of ``number``."""
         value = self.number(name)

@@ -15,7 +15,8 @@ from numpy.typing import ArrayLike, NDArray
 from rift_cl.errors import DTypeError, InputError, NonFiniteError, ShapeError
 from rift_cl.geometry import Grid
 
-_WINDOW = 11
+# Samples along each side of the window of SSIM, and so of the smallest image that it takes.
+SSIM_WINDOW = 11
 _Reals = NDArray[np.float64]
 _Mask = NDArray[np.bool_]
 
@@ -78,10 +79,10 @@ def ssim(
 
     found, wanted, counts = _checked(image, truth, mask)
     scale = _full_scale("ssim", peak, image, truth)
-    if found.ndim not in (2, 3) or min(found.shape) < _WINDOW:
+    if found.ndim not in (2, 3) or min(found.shape) < SSIM_WINDOW:
         raise ShapeError(
             f"ssim: image has shape {found.shape}, wanted (y, x) or (z, y, x) with every side "
-            f"{_WINDOW} or longer"
+            f"{SSIM_WINDOW} or longer"
         )
     _, similarity = structural_similarity(
         found,

@@ -18,6 +18,7 @@ from rift_cl.basis.angular.environment import (
     reflected_light,
 )
 from rift_cl.geometry import Camera
+from rift_cl.reference.sight import sights, sights_grad
 
 Floats = NDArray[np.float64]
 
@@ -44,7 +45,7 @@ def shade_light(
     means: Floats, normals: Floats, reflectance: Floats, environment: Floats, camera: Camera
 ) -> Floats:
     """What splats reflect towards a camera, (N, 3); see ``reflected_light`` for the arguments."""
-    away = means - camera.center
+    away = sights(means, camera)
     directions = away / np.linalg.norm(away, axis=1, keepdims=True)
     return reflected_light(normals, reflectance, environment, directions[:, None])[:, 0]
 
@@ -58,7 +59,7 @@ def shade_light_grad(
     incoming: Floats,
 ) -> LightGradients:
     """Gradients of the sum of reflected light times ``incoming`` (N, 3); see ``shade_light``."""
-    away = means - camera.center
+    away = sights(means, camera)
     distance = np.linalg.norm(away, axis=1, keepdims=True)
     d, length = away / distance, np.linalg.norm(normals, axis=1, keepdims=True)
     n, count = normals / length, len(environment)
@@ -85,12 +86,11 @@ def shade_light_grad(
     by_facing = -np.sign(facing) * by_edge - 2 * (by_r * n).sum(1, keepdims=True)
     by_n = by_facing * d - 2 * facing * by_r
     by_d = by_r + by_facing * n
-    by_means = (by_d - (by_d * d).sum(1, keepdims=True) * d) / distance
-    shift = np.linalg.inv(camera.view[:3, :3]).T @ by_means.sum(0)
+    by_means, view = sights_grad((by_d - (by_d * d).sum(1, keepdims=True) * d) / distance, camera)
     return LightGradients(
         normals=(by_n - (by_n * n).sum(1, keepdims=True) * n) / length,
         reflectance=np.concatenate([by_shares * shares * (1 - shares), by_log], 1),
         environment=radiance * (lobes.T @ (w * by_light)),
         means=by_means,
-        view=np.column_stack([np.outer(shift, camera.center), shift]),
+        view=view,
     )

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from rift_cl.basis.angular import AngularBasis
 from rift_cl.geometry import Camera
+from rift_cl.reference.sight import sights, sights_grad
 
 Floats = NDArray[np.float64]
 
@@ -36,7 +37,7 @@ class ShadeGradients(NamedTuple):
 def shade_lobes(
     basis: AngularBasis, means: Floats, linear: Floats, lobes: Floats | None, camera: Camera
 ) -> Floats:
-    """Colours (N, 3) seen from the camera's centre; black where they are no numbers.
+    """Colours (N, 3) as a camera sees them; black where they are no numbers.
 
     Args:
         basis: the functions.
@@ -46,7 +47,7 @@ def shade_lobes(
         camera: the view.
     """
     with np.errstate(all="ignore"):
-        color = basis.evaluate(linear, lobes, means - camera.center) + 0.5
+        color = basis.evaluate(linear, lobes, sights(means, camera)) + 0.5
     color[~np.isfinite(color).all(1)] = 0
     return np.maximum(color, 0)
 
@@ -61,12 +62,11 @@ def shade_lobes_grad(
 ) -> ShadeGradients:
     """Gradients of the sum of colours times ``incoming`` (N, 3); see ``shade_lobes``.
 
-    Colours that are held at zero, and black ones, have none. The camera stands at o = -W^-1 t, so
-    that by dL/do = -dL/dmean its t gains W^-T dL/dmean, and W that times o.
+    Colours that are held at zero, and black ones, have none.
     """
     shown = shade_lobes(basis, means, linear, lobes, camera) > 0
     with np.errstate(all="ignore"):
-        slopes = basis.evaluate(linear, lobes, means - camera.center, grad=True)
+        slopes = basis.evaluate(linear, lobes, sights(means, camera), grad=True)
 
     def flow(by: Floats) -> Floats:
         """Through each channel that is shown; nothing through the others, NaN or not."""
@@ -74,7 +74,5 @@ def shade_lobes_grad(
         return np.asarray(parts.sum(-1))
 
     by_linear = np.where(shown[:, None], slopes.by_coeff[..., None] * incoming[:, None], 0)
-    by_means = flow(slopes.by_directions)
-    shift = np.linalg.inv(camera.view[:3, :3]).T @ by_means.sum(0)
-    view = np.column_stack([np.outer(shift, camera.center), shift])
+    by_means, view = sights_grad(flow(slopes.by_directions), camera)
     return ShadeGradients(by_linear, flow(slopes.by_geometry), by_means, view)

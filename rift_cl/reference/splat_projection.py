@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rift_cl.geometry import Camera
+from rift_cl.reference.sight import sights
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -214,8 +215,8 @@ def _legendre(order: int, m: int, z: Floats) -> Floats:
 
 
 def shade_splats(means: Floats, sh: Floats, camera: Camera) -> Floats:
-    """Colours (N, 3) of splats with (N, K, 3) coefficients, seen from the camera's centre."""
+    """Colours (N, 3) of splats with (N, K, 3) coefficients, as a camera sees them."""
     degree = int(np.sqrt(sh.shape[1])) - 1
-    basis = spherical_harmonics(means - camera.center, degree)
+    basis = spherical_harmonics(sights(means, camera), degree)
     color: Floats = np.maximum(np.einsum("nk,nkc->nc", basis, sh) + 0.5, 0)
     return color

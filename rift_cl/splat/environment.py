@@ -17,6 +17,7 @@ from rift_cl.cl.array import DeviceArray
 from rift_cl.cl.device import Device
 from rift_cl.geometry import Camera
 from rift_cl.splat.projection import SplatGradients
+from rift_cl.splat.sight import sight_macros, sight_of
 from rift_cl.splat.splats import Splats
 
 # Numbers of a lobe's row and of a splat's for the light's gradient, and splats of a chunk of it.
@@ -50,10 +51,11 @@ def shade_environment(
         **_given(device, splats),
         culled=culled,
         features=into,
-        center=np.array([*camera.center, 0], np.float32),
+        center=np.array([*sight_of(camera), 0], np.float32),
         count=count,
         RUN=device.traits.run,
         STRIDE=into.shape[1],
+        **sight_macros(camera),
     )
 
 
@@ -80,7 +82,7 @@ def shade_environment_grad(
     by_normals, by_reflectance = device.empty((count, 3)), device.empty((count, 7))
     arrivals = device.empty((count, ARRIVAL))
     inverse = np.linalg.inv(camera.view[:3, :3]).T
-    inverse_rows = np.column_stack([inverse, camera.center]).astype(np.float32, order="C")
+    inverse_rows = np.column_stack([inverse, sight_of(camera)]).astype(np.float32, order="C")
     device.launch(
         "light_shade_grad",
         (device.traits.runs(count),),
@@ -97,6 +99,7 @@ def shade_environment_grad(
         RUN=device.traits.run,
         STRIDE=features.shape[1],
         CAMERA_GRADIENT=gradients.camera is not None,
+        **sight_macros(camera),
     )
     chunks = -(-count // CHUNK)
     parts = device.empty((chunks, 3 * lobe_count))

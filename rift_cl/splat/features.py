@@ -26,6 +26,7 @@ from rift_cl.geometry import Camera
 from rift_cl.splat.environment import shade_environment
 from rift_cl.splat.host_shading import shade_on_host, shade_on_host_grad
 from rift_cl.splat.projection import Projection, SplatGradients
+from rift_cl.splat.sight import sight_macros, sight_of
 from rift_cl.splat.splats import Splats
 
 # The numbers that kernels/include/shading/lobe.h knows the kinds of lobes by.
@@ -169,7 +170,9 @@ def shade(
     angular: str = "sh",
     lit: bool = False,
 ) -> DeviceArray:
-    """Colours of splats as seen from the camera's centre.
+    """Colours of splats in the directions that a camera sees them in.
+
+    That is from where it stands, and along its axis where it is orthographic.
 
     Args:
         device: where the arrays are.
@@ -197,7 +200,7 @@ def shade(
         given = (means, linear, geometry, camera, culled, features)
         shade_on_host(device, shading.on_host, *given, lit=lit)
         return features
-    center = np.array([*camera.center, 0], np.float32)
+    center = np.array([*sight_of(camera), 0], np.float32)
     device.launch(
         shading.kernel,
         (device.traits.runs(count),),
@@ -211,6 +214,7 @@ def shade(
         STRIDE=features.shape[1],
         **shading.sizes,
         **({"LIT": True} if lit else {}),
+        **sight_macros(camera),
     )
     return features
 
@@ -278,7 +282,7 @@ def shade_grad(
             shape = shading.parameters[coefficients].shape
             as_device_array(device, moment, shape, name=f"shade_grad: sh_step.{name}")
     inverse = np.linalg.inv(camera.view[:3, :3]).T
-    rows = np.column_stack([inverse, camera.center]).astype(np.float32, order="C")
+    rows = np.column_stack([inverse, sight_of(camera)]).astype(np.float32, order="C")
     device.launch(
         f"{shading.kernel}_grad",
         (device.traits.runs(count),),
@@ -297,6 +301,7 @@ def shade_grad(
         CAMERA_GRADIENT=gradients.camera is not None,
         ADAM=sh_step is not None,
         **shading.sizes,
+        **sight_macros(camera),
     )
     return by_sh
 

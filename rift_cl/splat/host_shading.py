@@ -15,6 +15,7 @@ from rift_cl.cl.array import DeviceArray
 from rift_cl.cl.device import Device
 from rift_cl.geometry import Camera
 from rift_cl.splat.projection import SplatGradients
+from rift_cl.splat.sight import sight_gradient, ways_to
 
 Floats = NDArray[np.float64]
 
@@ -32,7 +33,7 @@ def shade_on_host(
     lit: bool = False,
 ) -> None:
     """Write the colours of splats into the first three columns of ``features``; see ``shade``."""
-    away = device.get(means).astype(float) - camera.center
+    away = ways_to(camera, device.get(means).astype(float))
     colors = basis.evaluate(device.get(linear), device.get(lobes), away) + 0.5
     if lit:
         colors += device.get(features)[:, :3]
@@ -57,22 +58,21 @@ def shade_on_host_grad(
         The gradients by the coefficients, (N, L, 3), and by the geometry, (N, G); those by means
         and camera are added to ``gradients``.
     """
-    away = device.get(means).astype(float) - camera.center
+    away = ways_to(camera, device.get(means).astype(float))
     colors, incoming = (device.get(a)[:, :3] for a in (features, gradients.features))
     incoming = np.where(colors > 0, incoming, 0).astype(float)
     found = basis.evaluate(device.get(linear), device.get(lobes), away, grad=True)
     black = ~incoming.any(axis=1)
     by_linear = found.by_coeff[:, :, None] * incoming[:, None, :]
     by_lobes = np.einsum("ngc,nc->ng", found.by_geometry, incoming)
-    by_mean = np.einsum("nic,nc->ni", found.by_directions, incoming)
-    for array in (by_linear, by_lobes, by_mean):
+    by_away = np.einsum("nic,nc->ni", found.by_directions, incoming)
+    for array in (by_linear, by_lobes, by_away):
         array[black] = 0
+    by_mean, by_view = sight_gradient(camera, by_away)
     axpby(device, 1.0, device.array(by_mean), 1.0, gradients.means)
     if gradients.camera is not None:
-        shift = by_mean @ np.linalg.inv(camera.view[:3, :3])
         # Of the rows that are summed in the end the first one takes it all.
         parts = np.zeros(gradients.camera.shape)
-        total = shift.sum(axis=0)
-        parts[:1, :12] = np.column_stack([np.outer(total, camera.center), total]).ravel()
+        parts[:1, :12] = by_view.ravel()
         axpby(device, 1.0, device.array(parts), 1.0, gradients.camera)
     return device.array(by_linear), device.array(by_lobes)

@@ -92,6 +92,32 @@ def test_a_slice_of_distances_is_their_definition():
         assert inside[at] == pytest.approx(-min(away, 1) if away > -1 else -1, abs=1e-4)
 
 
+@pytest.mark.parametrize("voxels", [18, 19, 37, 96])
+def test_the_longest_edge_has_the_voxels_that_are_asked_for(voxels):
+    places = np.random.default_rng(voxels).normal(size=(5000, 3)) * [0.3, 1.0, 0.1]
+    shape = grid_of(places, voxels).shape
+    assert max(shape) == shape[1] == voxels and min(shape) > 10
+
+
+def test_the_fewest_voxels_of_a_sphere_are_still_one():
+    """With half as many there would be no more than the margin, and one voxel for the sphere."""
+    volume = fused(cameras(), fused_depth._FEWEST)
+    grid = volume.grid
+    vertices, triangles = surface(volume.inside(), grid, 0.0, volume.seen())
+    away = np.linalg.norm(vertices - MIDDLE, axis=1)
+    assert np.abs(away - 1).max() < grid.spacing[0]
+    corners = vertices[triangles].astype(float) - MIDDLE
+    assert np.linalg.det(corners).sum() / 6 == pytest.approx(4 / 3 * np.pi, rel=0.1)
+
+
+@pytest.mark.parametrize("voxels", [8, 17])
+def test_too_few_voxels_are_refused(ball, capsys, voxels):
+    words = ["--capture", str(ball / "transforms.json"), "--voxels", str(voxels), "--to", "obj"]
+    assert main(["export", "ball.ply", "--mesh", "--out", "ball.obj", *words]) != 0
+    told = " ".join(capsys.readouterr().err.split())
+    assert f"--voxels is {voxels}, wanted 18 or more" in told and not (ball / "ball.obj").exists()
+
+
 def test_cameras_that_see_nothing_are_told_so():
     camera = cameras(1)[0]
     places = places_of(camera, np.full(camera.size, np.inf, np.float32))

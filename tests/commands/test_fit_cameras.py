@@ -4,17 +4,20 @@ from __future__ import annotations
 
 import json
 import shutil
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from test_start import MIDDLE_OF_RING, ring
 
+from rift_cl.commands.cameras.arc import place_notes
 from rift_cl.commands.cameras.fit_cameras import open_fit_cameras, save_fit_cameras
 from rift_cl.commands.cameras.photograph_place import place_record
 from rift_cl.commands.cli import main
 from rift_cl.errors import FileFormatError, InputError
 from rift_cl.geometry.lens_distortion import LENS_MODELS, Lens
 from rift_cl.io.captures.capture import Capture, View, open_capture
+from rift_cl.io.images.image import write_png
 from rift_cl.io.output import write_json
 
 
@@ -104,9 +107,12 @@ def test_lenses_masks_and_points_come_back(tmp_path):
     for number, (model, names) in enumerate(LENS_MODELS.items()):
         lens = Lens(model, tuple(0.01 * k for k in range(1, len(names) + 1)), camera.K)
         views = views_of(photographs, ring(6), lens=lens, mask=mask)
+        circle = 3.5 if model.endswith("_FISHEYE") else None
+        views = tuple(replace(view, crop_radius=circle) for view in views)
         whole = Capture(views, points, colors, tmp_path, 0.75)
         found = saved(tmp_path / f"fit{number}", whole, photographs=9)
         assert all(view.lens == lens for view in found.views), model
+        assert all(view.crop_radius == circle for view in found.views), model
         assert all(view.mask.resolve() == mask for view in found.views)
         assert found.views[2].image == photographs / "2.png"
         np.testing.assert_array_equal(found.points, points)
@@ -229,6 +235,40 @@ def test_cameras_in_one_place_tell_no_depth_and_nothing_is_written(capture, tmp_
     assert main(["fit", str(place), "--out", str(tmp_path / "fit")]) == 3
     assert "all 8 cameras stand in one place" in capsys.readouterr().err
     assert not (tmp_path / "fit").exists()
+
+
+def test_a_single_photograph_is_told_to_tell_no_depth(capture, tmp_path, capsys):
+    place = tmp_path / "photograph"
+    shutil.copytree(capture, place)
+    record = json.loads((place / "transforms.json").read_text())
+    record["frames"] = record["frames"][:1]
+    (place / "transforms.json").write_text(json.dumps(record))
+    assert main(["fit", str(place), "--out", str(tmp_path / "fit"), "--dry-run"]) == 0
+    assert "tells nothing of depth" in " ".join(capsys.readouterr().out.split())
+    assert not place_notes(ring(2)) and not place_notes([])
+
+
+def test_a_fit_that_is_refused_before_it_begins_leaves_no_folder(capture, tmp_path, capsys):
+    """Cameras that look outward, without points: that is found when the work begins."""
+    place, out = tmp_path / "photographs", tmp_path / "fit"
+    shutil.copytree(capture, place)
+    record = json.loads((place / "transforms.json").read_text())
+    for number, frame in enumerate(record["frames"]):
+        turn = 2 * np.pi * number / 8
+        outward = np.array([np.cos(turn), np.sin(turn), 0])
+        right = np.array([-np.sin(turn), np.cos(turn), 0])
+        pose = np.eye(4)
+        pose[:3] = np.stack([right, [0, 0, 1], -outward, 0.1 * outward], axis=1)
+        pose[:3, 0] *= np.sign(np.linalg.det(pose[:3, :3]))
+        frame["transform_matrix"] = pose.tolist()
+        image = np.random.default_rng(number).integers(0, 256, (60, 80, 3)).astype(np.uint8)
+        write_png(place / frame["file_path"], image)
+    (place / "transforms.json").write_text(json.dumps(record))
+    assert main(["fit", str(place), "--out", str(out), "--steps", "2", "--quiet"]) == 3
+    refused = capsys.readouterr().err
+    assert refused.count("\n") == 1 and not out.exists()
+    words = ["--steps", "2", "--splats", "50", "--quiet"]
+    assert main(["fit", str(capture), "--out", str(out), *words]) == 0
 
 
 def test_the_arc_is_what_the_cameras_covered(tmp_path):

@@ -5,6 +5,7 @@ The stand-in of pycolmap places every photograph; what matters here is the way r
 
 from __future__ import annotations
 
+import dataclasses
 import json
 import shutil
 from pathlib import Path
@@ -17,7 +18,12 @@ from test_video import store_video
 from rift_cl.cl.discovery import default_device
 from rift_cl.commands.cli import main
 from rift_cl.commands.fit_photos.job import Fit
-from rift_cl.commands.fit_photos.photograph_size import MOST_PIXELS, fitting_downscale, size_words
+from rift_cl.commands.fit_photos.photograph_size import (
+    MOST_PIXELS,
+    check_window,
+    fitting_downscale,
+    size_words,
+)
 from rift_cl.commands.fit_photos.settings import FitPhotosSettings
 from rift_cl.errors import InputError
 from rift_cl.geometry.camera import Camera
@@ -135,3 +141,30 @@ def test_a_size_that_is_asked_for_is_kept(capture, tmp_path, monkeypatch):
     assert "--downscale 1 fits them as they are" in decided._notes()[0]
     with pytest.raises(InputError, match="--frames is 2"):
         FitPhotosSettings.of(capture=capture, out=tmp_path / "fit", frames=2).check()
+
+
+@pytest.mark.parametrize(
+    ("size", "factor", "words"),
+    [
+        ((96, 80), 50, "--downscale 50 leaves 1 x 1 pixels of b.png, .*take --downscale 7 or less"),
+        ((96, 80), 8, "leaves 12 x 10 pixels of b.png"),
+        ((20, 12), 2, "take --downscale 1, or do without .*--ssim-weight 0.*--hold-out 0"),
+        ((20, 10), 1, "along each side: do without .*--ssim-weight 0"),
+    ],
+)
+def test_photographs_smaller_than_the_window_of_ssim(size, factor, words):
+    views = [view(640, 480), dataclasses.replace(view(*size), name="b.png")]
+    with pytest.raises(InputError, match=words):
+        check_window(views, factor)
+    check_window([views[0]], min(factor, 43))
+
+
+def test_a_downscale_that_leaves_too_little_is_refused_before_anything_is_done(
+    capture, tmp_path, capsys
+):
+    words = ["fit", str(capture), "--out", str(tmp_path / "fit"), "--downscale", "6", "--dry-run"]
+    assert main(words) == 3
+    told = capsys.readouterr().err
+    assert "--downscale 6 leaves 13 x 10 pixels" in told and "--ssim-weight 0" in told
+    # Without SSIM in the loss and without scores nothing wants more pixels.
+    assert main([*words, "--ssim-weight", "0", "--hold-out", "0"]) == 0

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import threading
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -200,6 +201,21 @@ def test_the_border_of_a_pincushion_is_where_its_photograph_ends(tmp_path):
     masked = pictures([opened(tmp_path, codes(), mask=left_mask(15), lens=lens)])
     np.testing.assert_allclose(masked.behind, GREY / 255, atol=1e-6)
     assert not masked.foreground(0)[:, :14].any()
+
+
+def test_the_border_of_a_fisheye_is_its_circle_and_not_the_black_around_it(tmp_path):
+    picture = codes()
+    y, x = np.mgrid[:24, :30]
+    picture[np.hypot(x - 14.5, y - 11.5) >= 11] = 0
+    lens = Lens("OPENCV_FISHEYE", (0, 0, 0, 0), [[70, 0, 15], [0, 70, 12], [0, 0, 1]])
+    view = replace(opened(tmp_path, picture, lens=lens), crop_radius=11.0)
+    for seen in (pictures([view]), pictures([view], downscale=2)):
+        np.testing.assert_allclose(seen.behind, GREY / 255, atol=1e-3)
+        assert 0.5 < seen.counted(0).mean() < 0.6
+    # So it is beneath a mask, whose own edge runs through what is photographed.
+    store(tmp_path / "mask.png", left_mask(15), "uint8")
+    masked = pictures([replace(view, mask=tmp_path / "mask.png")])
+    np.testing.assert_allclose(masked.behind, GREY / 255, atol=1e-6)
 
 
 def test_the_edge_of_a_mask_is_no_border(tmp_path):

@@ -61,6 +61,23 @@ def broken_off(given, after):
     return str(caught.value)
 
 
+def test_the_config_of_a_fit_that_was_broken_off_goes_on_with_it(capture, tmp_path, capsys):
+    """It says what was asked for; what was decided is in the checkpoint."""
+    whole, cut = tmp_path / "whole", tmp_path / "cut"
+    given = {"seed": 3, "downscale": 2}
+    list(Fit(settings(capture, whole, **given)).run())
+    broken_off(settings(capture, cut, **given), 25)
+    config = ["--config", str(cut / "config.json")]
+    assert main(["fit", *config, "--resume", "--quiet"]) == 0
+    assert digest(cut) == digest(whole)
+    # It begins another as well, in a folder that is named.
+    again = tmp_path / "again"
+    broken_off(settings(capture, tmp_path / "other", **given), 25)
+    config = ["--config", str(tmp_path / "other" / "config.json")]
+    assert main(["fit", *config, "--out", str(again), "--quiet"]) == 0
+    assert digest(again) == digest(whole)
+
+
 @pytest.mark.full
 @pytest.mark.parametrize("variant", VARIANTS)
 def test_a_fit_that_was_broken_off_goes_on_to_the_same_bits(capture, tmp_path, variant):

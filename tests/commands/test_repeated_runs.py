@@ -108,6 +108,8 @@ def test_a_dry_run_of_center_writes_nothing(scan, tmp_path, capsys):
         ({"job": "analyze"}, ("rift analyze", "rift plan")),
         ({"settings": {"veiws": 3}}, ("veiws",)),
         ({"settings": {"veiws": 3}, "rift_cl": "0.0.1"}, ("0.0.1",)),
+        ({"complete": False}, ("did not come to its end", "asked for")),
+        ({"complete": False, "asked": {"veiws": 3}}, ("veiws",)),
     ],
 )
 def test_a_config_that_does_not_fit_is_told(tmp_path, capsys, change, words):

@@ -9,6 +9,7 @@ import pytest
 from projection_scenes import camera_of, random_splats
 
 import rift_cl as rift
+from rift_cl.reference.splat_projection import spherical_harmonics
 from rift_cl.splat.settings import SplatSettings
 
 torch = pytest.importorskip("torch", reason="torch is not installed")
@@ -45,6 +46,21 @@ def scene(*, grad=False, batch=(), channels=None):
 def draw(device, arguments, **options):
     options = {"sh_degree": 3 if np.ndim(arguments["colors"]) > 2 else None} | options
     return rasterization(**arguments, **options, device=device)
+
+
+def test_colors_of_an_orthographic_camera_are_seen_from_where_it_stands(device):
+    """As in gsplat, which takes no account of rays that are parallel there."""
+    given = scene()
+    harmonics, colors = given["colors"].numpy().astype(float), []
+    for view in given["viewmats"].numpy().astype(float):
+        center = -np.linalg.solve(view[:3, :3], view[:3, 3])
+        basis = spherical_harmonics(given["means"].numpy() - center, 3)
+        colors.append(np.maximum(np.einsum("nk,nkc->nc", basis, harmonics) + 0.5, 0))
+    plain = given | {"colors": torch.tensor(np.float32(colors))}
+    wanted, *_ = draw(device, plain, sh_degree=None, camera_model="ortho")
+    found, *_ = draw(device, given, camera_model="ortho")
+    assert wanted.std() > 0.01
+    np.testing.assert_allclose(found.numpy(), wanted.numpy(), atol=2e-5)
 
 
 def test_the_image_is_that_of_our_own_api(device):

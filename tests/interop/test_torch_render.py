@@ -87,7 +87,7 @@ def oracle(values, views, Ks, model, settings, *, depth=None, behind=None):
         covars = twin.covariance(leaves["quats"], leaves["scales"])
         placed = (leaves["means"], covars, leaves["opacities"], view, lens)
         seen = twin.screen(*placed, camera=camera, settings=settings)
-        features = twin.shade(leaves["means"], leaves["sh"], view)
+        features = twin.shade(leaves["means"], leaves["sh"], view, model)
         images.append(_composite(seen, features, leaves["backgrounds"][number], settings, depth))
     return torch.stack(images), leaves
 

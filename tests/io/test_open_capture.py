@@ -154,6 +154,21 @@ def test_lines_of_features_may_be_left_out(tmp_path: Path, left_out: tuple[int, 
     check_cameras(open_capture(tmp_path))
 
 
+def test_names_of_several_words_that_end_in_a_number_in_a_text_model(tmp_path: Path) -> None:
+    """Such a line has as many words as one of features may have, and ends as that does."""
+    path = made.colmap_text(tmp_path) / "images.txt"
+    text = path.read_text()
+    for name, other in zip(made.NAMES, ("shot a 1", "shot a 2", "a b c d e 3"), strict=True):
+        text = text.replace(name, other)
+    kept = [line for k, line in enumerate(text.split("\n\n", 1)[1].split("\n")) if k % 2 == 0]
+    path.write_text("\n".join(kept))
+    views = open_capture(tmp_path, photographs=False).views
+    assert [view.name for view in views] == ["a b c d e 3", "shot a 1", "shot a 2"]
+    path.write_text(text)
+    again = open_capture(tmp_path, photographs=False).views
+    assert [view.name for view in again] == [view.name for view in views]
+
+
 def test_a_name_that_is_a_number_in_a_text_model(tmp_path: Path) -> None:
     path = made.colmap_text(tmp_path) / "images.txt"
     lines = [line for line in path.read_text().replace("a.png", "0001").split("\n") if line]
@@ -201,6 +216,25 @@ def test_a_frame_overrides_what_stands_for_all(tmp_path: Path) -> None:
         ({"camera_model": "SIMPLE_RADIAL", "k1": 0.1, "k2": 0.0}, "SIMPLE_RADIAL", (0.1,)),
         ({"camera_model": "PINHOLE", "k1": 0.0}, None, ()),
         ({"k1": 0.0, "k2": 0, "p1": None}, None, ()),
+        ({"distortion_params": [0.1, 0.2, 0, 0, 0.3, 0.4]}, "OPENCV", (0.1, 0.2, 0.3, 0.4)),
+        ({"distortion_params": [0.1, 0, 0, 0, 0, 0], "k1": 0.1}, "OPENCV", (0.1, 0, 0, 0)),
+        (
+            {"distortion_params": [0.1, 0.2, 0.3, 0, 0.4, 0.5]},
+            "FULL_OPENCV",
+            (0.1, 0.2, 0.4, 0.5, 0.3, 0, 0, 0),
+        ),
+        (
+            {"camera_model": "OPENCV_FISHEYE", "distortion_params": [0.1, 0.2, 0.3, 0.4, 0, 0]},
+            "OPENCV_FISHEYE",
+            (0.1, 0.2, 0.3, 0.4),
+        ),
+        (
+            {"camera_model": "OPENCV_FISHEYE", "distortion_params": [0.1, 0.2, 0.3, 0.4]},
+            "OPENCV_FISHEYE",
+            (0.1, 0.2, 0.3, 0.4),
+        ),
+        ({"distortion_params": [0.0] * 6}, None, ()),
+        ({"latlong": False, "equirectangular": None, "ftheta_p0": None}, None, ()),
     ],
 )
 def test_lenses_of_a_transforms_json(
@@ -208,6 +242,28 @@ def test_lenses_of_a_transforms_json(
 ) -> None:
     lens = open_capture(made.transforms(tmp_path, **fields)).views[0].lens
     assert lens == (None if model is None else Lens(model, coefficients, K))
+
+
+def test_a_list_of_coefficients_in_a_frame_overrides_that_of_all(tmp_path: Path) -> None:
+    path = made.transforms(tmp_path, k1=0.5, k2=0.25, distortion_params=[0.5, 0.25, 0, 0, 0, 0])
+    made.changed(path, 1, distortion_params=[0.125, 0, 0, 0, 0, 0])
+    first, second, _ = open_capture(path).views
+    assert first.lens == Lens("OPENCV", (0.5, 0.25, 0, 0), K)
+    assert second.lens == Lens("OPENCV", (0.125, 0, 0, 0), K)
+
+
+def test_the_circle_of_a_fisheye_is_known_and_told(tmp_path: Path) -> None:
+    path = made.transforms(tmp_path, camera_model="OPENCV_FISHEYE", fisheye_crop_radius=3.5)
+    capture = open_capture(made.changed(path, 1, fisheye_crop_radius=3))
+    assert [view.crop_radius for view in capture.views] == [3.5, 3, 3.5]
+    assert any("'fisheye_crop_radius'" in note and "3.5 pixels" in note for note in capture.notes)
+
+
+def test_the_circle_of_a_lens_that_is_no_fisheye_is_left_alone(tmp_path: Path) -> None:
+    """As nerfstudio does, so that the field may stay once lenses were undone."""
+    capture = open_capture(made.transforms(tmp_path, k1=0.1, fisheye_crop_radius=3.5))
+    assert all(view.crop_radius is None for view in capture.views)
+    assert not any("fisheye" in note for note in capture.notes)
 
 
 @pytest.mark.parametrize("write", [made.colmap_binary, made.colmap_text])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -112,6 +113,46 @@ def test_where_a_photograph_with_alpha_does_not_reach_nothing_is_known(tmp_path:
     assert not image[:, : WIDTH // 2 - 1, 3].any()
     right = inside & (np.arange(WIDTH) > WIDTH // 2)
     np.testing.assert_allclose(image[right][:, 3], 200 / 255, atol=1e-6)
+
+
+@pytest.mark.parametrize("downscale", [1, 2])
+def test_outside_of_the_circle_of_a_fisheye_nothing_is_known(
+    tmp_path: Path, downscale: int
+) -> None:
+    """An equidistant lens: the pinhole sees the circle's edge at the tangent of its angle."""
+    radius, focal = 25.0, 50.0
+    codes = np.zeros((HEIGHT, WIDTH, 3), np.uint8)
+    y, x = np.mgrid[:HEIGHT, :WIDTH] + 0.5
+    codes[np.hypot(x - WIDTH / 2, y - HEIGHT / 2) < radius] = 200
+    write_png(tmp_path / "a.png", codes)
+    middle = [[focal, 0, WIDTH / 2], [0, focal, HEIGHT / 2], [0, 0, 1]]
+    lens = Lens("OPENCV_FISHEYE", (0, 0, 0, 0), middle)
+    view = replace(view_of(tmp_path / "a.png", lens=lens), crop_radius=radius)
+    image, known = read_known_view(view, downscale=downscale)
+    assert known is not None and image.shape[2] == 3
+    down, across = (
+        (np.arange(count) + 0.5) * downscale - extent / 2
+        for count, extent in zip(known.shape, (HEIGHT, WIDTH), strict=True)
+    )
+    away = np.hypot(across, down[:, None])
+    edge = focal * np.tan(radius / focal)
+    assert (known[away < edge - 2 * downscale] == 1).all()
+    assert not known[away > edge + 2 * downscale].any()
+    # The black around the circle is no part of what is known.
+    np.testing.assert_allclose(image[known > 0], 200 / 255, atol=1e-6)
+    np.testing.assert_array_equal(read_view(view, downscale=downscale)[..., 3], known)
+
+
+def test_a_mask_leaves_out_more_of_the_circle_of_a_fisheye(tmp_path: Path) -> None:
+    write_png(tmp_path / "a.png", np.full((HEIGHT, WIDTH, 3), 200, np.uint8))
+    mask = np.full((HEIGHT, WIDTH), 255, np.uint8)
+    mask[:, : WIDTH // 2] = 0
+    write_png(tmp_path / "mask.png", mask)
+    view = replace(view_of(tmp_path / "a.png", tmp_path / "mask.png"), crop_radius=20.0)
+    _, known = read_known_view(view)
+    y, x = np.mgrid[:HEIGHT, :WIDTH] + 0.5
+    circle = np.hypot(x - WIDTH / 2, y - HEIGHT / 2) < 20
+    np.testing.assert_array_equal(known, circle & (x > WIDTH / 2))
 
 
 def test_a_mask_is_taken_through_the_lens_too(tmp_path: Path) -> None:

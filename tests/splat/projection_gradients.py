@@ -94,7 +94,7 @@ def oracle(values, kind, sums, drawn, *, depth_channel=False, shaded=True):
         camera=kind.camera,
         settings=kind.settings,
     )
-    colors = twin.shade(seen["means"], seen["sh"], view) if shaded else None
+    colors = twin.shade(seen["means"], seen["sh"], view, kind.model) if shaded else None
     twin.loss(screen, torch.tensor(sums[drawn]), colors, depth_channel=depth_channel).backward()
     found = {name: leaf.grad.numpy() for name, leaf in leaves.items() if leaf.grad is not None}
     if opening is not None:

@@ -18,7 +18,7 @@ def twin():
     ANGULAR_BASES.remove("twin")
 
 
-def rendered(device, angular):
+def rendered(device, angular, model):
     random = np.random.default_rng(3)
     values = {
         "means": random.uniform(-1, 1, (40, 3)),
@@ -31,7 +31,7 @@ def rendered(device, angular):
     view = np.eye(4)
     view[:3, 3] = 0.1, -0.2, 4
     view[:2, :2] = [[0.8, 0.6], [-0.6, 0.8]]
-    camera = Camera((24, 28), [[30, 0, 14], [0, 30, 12], [0, 0, 1]], view)
+    camera = Camera((24, 28), [[30, 0, 14], [0, 30, 12], [0, 0, 1]], view, model)
     renderer = Renderer(SplatSettings(angular=angular), device=device)
     frame = renderer.forward(Splats.upload(device, **values), camera)
     incoming = device.array(random.normal(size=frame.image.shape))
@@ -40,8 +40,10 @@ def rendered(device, angular):
     return [device.get(array) for array in arrays]
 
 
-def test_the_host_gives_what_the_kernel_gives(device, twin):
-    for one, other in zip(rendered(device, twin), rendered(device, "sg"), strict=True):
+@pytest.mark.parametrize("model", ["pinhole", "ortho"])
+def test_the_host_gives_what_the_kernel_gives(device, twin, model):
+    found = (rendered(device, angular, model) for angular in (twin, "sg"))
+    for one, other in zip(*found, strict=True):
         assert np.abs(other).max() > 0.1
         np.testing.assert_allclose(one, other, rtol=1e-4, atol=1e-4 * np.abs(other).max())
 

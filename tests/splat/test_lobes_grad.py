@@ -15,6 +15,7 @@ from lobe_scenes import (
     seen,
     seen_grad,
 )
+from projection_scenes import camera_of
 
 from rift_cl.basis.angular import SphericalHarmonics
 from rift_cl.reference.lobes import shade_lobes, shade_lobes_grad
@@ -47,6 +48,20 @@ def check_gradients(device, kind, count):
         for name in NAMES:
             assert error(found[name], getattr(twin, name)) < 1e-4, name
         assert not found["lens"].any()
+
+
+@pytest.mark.parametrize("kind, count", [("sg", 4), ("lg", 9)])
+def test_gradients_of_parallel_rays_are_the_twins(device, kind, count):
+    """They flow to the camera's axis, and to no mean."""
+    given, camera = random_lobes(kind, count), camera_of("ortho")
+    incoming = incoming_for(given)
+    found, twin = (
+        seen_grad(device, given, incoming, camera=camera),
+        given.gradients(incoming, camera),
+    )
+    for name in ("linear", "lobes", "view"):
+        assert error(found[name], getattr(twin, name)) < 1e-4, name
+    assert not found["means"].any() and not found["view"][:2].any() and found["view"][2, :3].all()
 
 
 @pytest.mark.parametrize("kind, count", [("sg", 4), ("lg", 9)])
@@ -90,6 +105,14 @@ def test_so_are_those_of_harmonics():
     check_differences(basis, [means, linear, None], incoming, found)
 
 
+@pytest.mark.parametrize("kind, count", [("sg", 4), ("asg", 4)])
+def test_so_are_those_of_parallel_rays(kind, count):
+    given, camera = bright(random_lobes(kind, count, 8)), camera_of("ortho")
+    arrays, incoming = list(given.exact()), incoming_for(given).astype(float)
+    found = shade_lobes_grad(given.basis, *arrays, camera, incoming)
+    check_differences(given.basis, arrays, incoming, found, camera)
+
+
 def bright(given):
     """Nothing near the edge of being held at zero."""
     linear = 0.1 * given.linear
@@ -97,11 +120,11 @@ def bright(given):
     return Lobes(given.kind, given.means, linear, given.lobes)
 
 
-def check_differences(basis, arrays, incoming, found):
+def check_differences(basis, arrays, incoming, found, camera=CAMERA):
     """Directional derivatives along a few random directions of each argument."""
     random = np.random.default_rng(5)
 
-    def loss(means, linear, lobes, camera=CAMERA):
+    def loss(means, linear, lobes, camera=camera):
         return (shade_lobes(basis, means, linear, lobes, camera) * incoming).sum()
 
     for place, gradient in enumerate((found.means, found.linear, found.lobes)):
@@ -117,7 +140,7 @@ def check_differences(basis, arrays, incoming, found):
             np.testing.assert_allclose((gradient * along).sum(), slope, rtol=2e-6, atol=2e-7)
     for _ in range(3):
         along = np.vstack([random.standard_normal((3, 4)), np.zeros(4)])
-        views = [Moved(CAMERA.view + step * along) for step in (1e-6, -1e-6)]
+        views = [Moved(camera.view + step * along, camera.model) for step in (1e-6, -1e-6)]
         slope = (loss(*arrays, views[0]) - loss(*arrays, views[1])) / 2e-6
         np.testing.assert_allclose((found.view * along[:3]).sum(), slope, rtol=2e-6, atol=2e-7)
 
@@ -125,6 +148,6 @@ def check_differences(basis, arrays, incoming, found):
 class Moved:
     """A camera whose view matrix is any matrix: what the twin needs of one."""
 
-    def __init__(self, view):
-        self.view = view
+    def __init__(self, view, model):
+        self.view, self.model = view, model
         self.center = -np.linalg.inv(view[:3, :3]) @ view[:3, 3]

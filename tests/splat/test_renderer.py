@@ -72,7 +72,7 @@ def oracle(way, values, frame, device, grad_image):
     )
     parts = (pixels, conics[:, 0, :], conics[:, 1, 1:], weights[:, None])
     screen = torch.cat(parts, 1)
-    colors = twin.shade(leaves["means"], leaves["sh"], view)
+    colors = twin.shade(leaves["means"], leaves["sh"], view, frame.camera.model)
     lists = Lists(
         device.get(frame.lists.entries),
         device.get(frame.lists.starts),

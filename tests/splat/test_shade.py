@@ -7,6 +7,7 @@ import pytest
 from projection_scenes import Kind, camera_of, random_splats, upload
 
 from rift_cl.errors import InputError, ShapeError
+from rift_cl.geometry import Camera
 from rift_cl.reference.splat_projection import shade_splats, spherical_harmonics
 from rift_cl.splat.features import shade, shade_grad
 from rift_cl.splat.projection import project, project_grad
@@ -25,15 +26,32 @@ def colors_of(device, values, kind=None):
     return device.get(colors), device.get(projected.culled) == 0
 
 
-@pytest.mark.parametrize("coefficients", COEFFICIENTS)
-def test_colors_are_the_twins(device, coefficients):
-    values = random_splats(coefficients=coefficients)
-    colors, drawn = colors_of(device, values)
-    twin = shade_splats(values["means"].astype(float), values["sh"].astype(float), Kind().camera)
+@pytest.mark.parametrize(
+    ("coefficients", "model"), [*((count, "pinhole") for count in COEFFICIENTS), (16, "ortho")]
+)
+def test_colors_are_the_twins(device, coefficients, model):
+    values, kind = random_splats(coefficients=coefficients), Kind(model)
+    colors, drawn = colors_of(device, values, kind)
+    twin = shade_splats(values["means"].astype(float), values["sh"].astype(float), kind.camera)
     held = (twin[drawn] == 0).mean()
     assert held < 0.3 and (held > 0.01 or coefficients == 1), "some are held at zero, not most"
     np.testing.assert_allclose(colors[drawn], twin[drawn], rtol=1e-5, atol=3e-6)
     assert not colors[~drawn].any()
+
+
+def test_parallel_rays_see_the_same_colors_from_any_distance(device):
+    """Those of the camera's axis, to the bit, wherever along it or beside it the camera stands."""
+    values = random_splats(30, coefficients=16)
+    splats, drawn = upload(device, values, Kind("ortho")), device.array(np.zeros(30, np.uint8))
+    near = camera_of("ortho")
+    view = near.view.copy()
+    view[:3, 3] += 0.5, -2, 1000
+    far = Camera(near.size, near.K, view, "ortho")
+    colors = [shade(device, splats.means, splats.sh, camera, drawn) for camera in (near, far)]
+    np.testing.assert_array_equal(*map(device.get, colors))
+    basis = spherical_harmonics(near.view[2:3, :3], 3)
+    wanted = np.maximum(np.einsum("k,nkc->nc", basis[0], values["sh"]) + 0.5, 0)
+    np.testing.assert_allclose(device.get(colors[0]), wanted, rtol=1e-5, atol=3e-6)
 
 
 def test_functions_of_the_twin_are_orthonormal():
@@ -95,14 +113,12 @@ def grad_of_ones(device, splats, projected, channels=3):
 
 
 def test_splat_where_the_camera_stands_has_a_color_and_no_gradient_by_direction(device):
-    camera = camera_of("ortho", distance=0.0)
-    kind = Kind("ortho", settings=SplatSettings(near=-1e3))
+    camera = camera_of("pinhole", distance=0.0)
     values = random_splats(1)
     # The nearest float32 to the centre, which is as near as a splat can come.
     values["means"] = camera.center[None].astype(np.float32)
-    splats = upload(device, values, kind)
-    projected = project(device, splats, camera, kind.settings)
-    color = device.get(shade(device, splats.means, splats.sh, camera, projected.culled))
+    splats, drawn = upload(device, values, Kind()), device.array(np.zeros(1, np.uint8))
+    color = device.get(shade(device, splats.means, splats.sh, camera, drawn))
     assert np.isfinite(color).all()
 
 

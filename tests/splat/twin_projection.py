@@ -91,10 +91,10 @@ def screen(means, covars, opacities, view, lens, opening=None, *, camera, settin
     return pixels, torch.linalg.inv(wide), opacities * factor, points[:, 2]
 
 
-def shade(means, sh, view):
-    """Colours of splats with spherical harmonics."""
+def shade(means, sh, view, model="pinhole"):
+    """Colours of splats with spherical harmonics; parallel rays go along the camera's axis."""
     center = -torch.linalg.inv(view[:, :3]) @ view[:, 3]
-    direction = means - center
+    direction = view[2:, :3].expand(len(means), 3) if model == "ortho" else means - center
     x, y, z = (direction / direction.norm(dim=1, keepdim=True)).unbind(1)
     color = torch.full((len(means), 3), 0.5, dtype=means.dtype)
     degree = int(np.sqrt(sh.shape[1])) - 1

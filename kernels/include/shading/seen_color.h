@@ -11,6 +11,10 @@
  * which is linear: a work-item sums dL/dmean over its splats and adds this once, to its own row of
  * camera_parts.
  *
+ * With PARALLEL 1 the rays of the camera are parallel: every splat is seen in the direction of its axis
+ * a, the third row of W, which comes in place of o. No mean changes it; dL/da = g - (g . d) d is
+ * summed instead, and is added to that row of dL/dW.
+ *
  * Coefficients are 3 FUNCTIONS numbers in a splat's row, three channels to a function. Four functions
  * are twelve numbers, three whole fours of columns (splat_rows.h), and go through registers at once.
  * Tables of features have STRIDE numbers for each splat, of which the first three are the colour. */
@@ -31,17 +35,26 @@
 #ifndef LIT
 #define LIT 0
 #endif
+#ifndef PARALLEL
+#define PARALLEL 0
+#endif
 /* Functions, and columns, that go through registers at once. */
 #define AT_ONCE 4
 #define NUMBERS_AT_ONCE 12
 
-/* The direction that splats are seen in, and one over their distance. */
+/* The direction that splats are seen in, and one over their distance (1 where rays are parallel). */
 typedef struct {
   lanes3 direction;
   lanes inverse;
 } Sight;
 
 static Sight sight_of(lanes3 mean, float3 center) {
+#if PARALLEL
+  Sight s;
+  s.inverse = 1;
+  s.direction = lanes3_of(center.x, center.y, center.z);
+  return s;
+#else
   const lanes3 away = lanes3_of(mean.x - center.x, mean.y - center.y, mean.z - center.z);
   const lanes square = dot_of(away, away);
   const lanes_int apart = (square > LEAST_SQUARE) & (square < MOST_SQUARE);
@@ -50,6 +63,7 @@ static Sight sight_of(lanes3 mean, float3 center) {
   s.direction = lanes3_of(
       apart ? away.x * s.inverse : 0, apart ? away.y * s.inverse : 0, apart ? away.z * s.inverse : 1);
   return s;
+#endif
 }
 
 /* Asks for the coefficients of the splats after the next LANES: a row of harmonics is three lines of
@@ -141,29 +155,37 @@ static void step_coefficients(
 }
 #endif
 
-/* dL/dmean from the gradient g by the direction, where a splat is seen. */
+/* dL/dmean, or dL/da, from the gradient g by the direction, where a splat is seen. */
 static lanes3 mean_grad(lanes3 g, Sight s, lanes_int seen) {
   return where(seen, times(s.inverse, minus(g, times(dot_of(g, s.direction), s.direction))));
 }
 
 static void add_to_means(__global float *grad_means, Rows rows, lanes3 by_mean) {
+#if !PARALLEL
   write3(grad_means, 3, rows, plus(read3(grad_means, 3, rows), by_mean));
+#endif
 }
 
-/* Adds what a work-item's sum of dL/dmean is worth by the camera; x, y, z are the rows of W^-T, each
+/* Adds what a work-item's sum of dL/dmean, or of dL/da, is worth by the camera; x, y, z are the rows of W^-T, each
  * followed by a coordinate of o. */
 static void add_to_camera(lanes3 by_means, float4 x, float4 y, float4 z, __global float *camera_parts) {
 #if CAMERA_GRADIENT
   const float3 by = (float3)(SUM_OF_LANES(by_means.x), SUM_OF_LANES(by_means.y), SUM_OF_LANES(by_means.z));
+  __global float *part = camera_parts + 16 * (long)get_global_id(0);
+#if PARALLEL
+  part[8] += by.x;
+  part[9] += by.y;
+  part[10] += by.z;
+#else
   const float shift[3] = {
       x.x * by.x + x.y * by.y + x.z * by.z, y.x * by.x + y.y * by.y + y.z * by.z,
       z.x * by.x + z.y * by.y + z.z * by.z};
-  __global float *part = camera_parts + 16 * (long)get_global_id(0);
   for (int k = 0; k < 3; k++, part += 4) {
     part[0] += shift[k] * x.w;
     part[1] += shift[k] * y.w;
     part[2] += shift[k] * z.w;
     part[3] += shift[k];
   }
+#endif
 #endif
 }

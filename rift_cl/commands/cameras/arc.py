@@ -120,3 +120,13 @@ def check_places(cameras: Sequence[Camera], where: Path) -> None:
             f"{where}: all {len(cameras)} cameras stand in one place, which tells nothing of "
             "depth: wanted photographs from two places or more"
         )
+
+
+def place_notes(cameras: Sequence[Camera]) -> list[str]:
+    """A sentence about a single photograph, which fits any depth."""
+    if len(cameras) != 1:
+        return []
+    return [
+        "One photograph alone tells nothing of depth: how far off what it shows is placed is a "
+        "guess, and views from anywhere else show that guess; photograph from two places or more"
+    ]

@@ -127,7 +127,12 @@ def save_fit_cameras(
     bounds = bounds_of_cameras(cameras, points=capture.points)
     masks = names_of_masks(views)
     fields = [
-        {"split": splits[view.name], **_turned(view), **mask, **lens_fields(view.lens)}
+        {
+            "split": splits[view.name],
+            **_turned(view),
+            **mask,
+            **lens_fields(view.lens, view.crop_radius),
+        }
         for view, mask in zip(views, masks, strict=True)
     ]
     record = transforms_of(cameras, [view.name for view in views], fields)

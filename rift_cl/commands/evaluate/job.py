@@ -11,6 +11,7 @@ from typing import Any
 from rift_cl.commands.cameras.fit_cameras import FitCameras, open_fit_cameras
 from rift_cl.commands.evaluate.report import eval_page
 from rift_cl.commands.evaluate.settings import EvalSettings
+from rift_cl.commands.fit_photos.comparison import compared_record, comparison_notes
 from rift_cl.commands.fit_photos.pictures import CapturePictures
 from rift_cl.commands.fit_photos.scores import (
     Floats,
@@ -195,13 +196,14 @@ class Evaluation:
         self.scores = {name: scores for name, scores in self.scores.items() if scores}
         if not self.scores:
             raise InputError(f"{self.scene.name}: every mask is black, there is nothing to score")
-        self.notes += self._left_out()
+        self.notes += [*self._left_out(), *comparison_notes(self.scores)]
         self.metrics = {
             "splats": len(self.scene.splats),
             "eps2d": self.scene.rendering.eps2d,
             "downscale": self.downscale,
             "background": {name: color.tolist() for name, color in self.backgrounds.items()},
             **score_record(self.scores),
+            **compared_record(self.scores),
             **error_record(self.scores),
         }
         page = eval_page(self.scene.name, self.scores, self.metrics, self.notes)

@@ -2,13 +2,19 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 from itertools import compress
 from typing import Any
 
 from rift_cl.commands.fit_photos.error_places_report import show_error_places
-from rift_cl.commands.fit_photos.report import COLUMNS, SCORES, SCORING, score_rows, show_views
+from rift_cl.commands.fit_photos.report import (
+    COLUMNS,
+    SCORES,
+    SCORING,
+    SCORING_ALONE,
+    score_rows,
+    show_views,
+)
 from rift_cl.commands.fit_photos.scores import ViewScore
 from rift_cl.report.html_page import Page
 
@@ -27,28 +33,25 @@ def eval_page(
         page.section(f"Pictures: {group}")
         show_views(page, scores, "scene")
     page.section("Scores")
-    page.table(*score_table(metrics), caption=SCORING)
+    columns, rows, caption = score_table(metrics)
+    page.table(columns, rows, caption=caption)
     for note in notes:
         page.paragraph(note)
     for group, scores in groups.items():
         trained = any("nearest_psnr" in score.values for score in scores)
         kinds = [kind for kind in SCORES if any(f"fit_{kind}" in s.values for s in scores)]
         columns = ["picture", *(SCORES[kind] for kind in kinds), *(_TRAINED if trained else ())]
-        rows = [_row(score, kinds, trained) for score in scores]
-        page.table(columns, rows, caption=group)
+        page.table(columns, [_row(score, kinds, trained) for score in scores], caption=group)
     show_error_places(page, metrics["errors"])
     return page
 
 
-def score_table(metrics: Mapping[str, Any]) -> tuple[Sequence[str], list[tuple[Any, ...]]]:
-    """Columns and rows of mean scores; without the baselines' where there are none."""
+def score_table(metrics: Mapping[str, Any]) -> tuple[Sequence[str], list[tuple[Any, ...]], str]:
+    """Columns and rows of mean scores, and a caption; without baselines where there are none."""
     rows = score_rows(metrics)
-    known = [not all(_unknown(row[place]) for row in rows) for place in range(len(COLUMNS))]
-    return list(compress(COLUMNS, known)), [tuple(compress(row, known)) for row in rows]
-
-
-def _unknown(cell: Any) -> bool:
-    return isinstance(cell, float) and math.isnan(cell)
+    known = [any(row[place] is not None for row in rows) for place in range(len(COLUMNS))]
+    caption = SCORING if all(known) else SCORING_ALONE
+    return list(compress(COLUMNS, known)), [tuple(compress(row, known)) for row in rows], caption
 
 
 def _row(score: ViewScore, kinds: Sequence[str], trained: bool) -> tuple[Any, ...]:

@@ -33,6 +33,11 @@ _CAMERAS, _SOLID = 64, 0.5
 _REACH = 4.0
 # Voxels along each axis beyond what cameras see.
 _MARGIN = 10
+# Voxels along the longest edge at least: between opposite sides of what is seen the distances of
+# both have their whole reach.
+_FEWEST = int(_MARGIN + 2 * _REACH)
+# Share of a voxel that is rounding.
+_ROUNDING = 1e-6
 # Pixels of each camera by which the grid is laid, at most, and bytes that a voxel takes at most.
 _PLACES, _BYTES = 20_000, 24
 # Share of the places that cameras see which lies beyond each side of the grid.
@@ -57,6 +62,11 @@ class FusedDepth:
         if settings.level is not None:
             raise InputError(
                 "--level is a density, which scenes of photographs have not: leave it out"
+            )
+        if settings.voxels < _FEWEST:
+            raise InputError(
+                f"--voxels is {settings.voxels}, wanted {_FEWEST} or more of a scene of "
+                f"photographs: {_MARGIN} of them lie beyond what its cameras see"
             )
         self._scene = OpenedScene(settings)
         self._voxels = settings.voxels
@@ -139,7 +149,7 @@ def grid_of(places: NDArray[np.float64], voxels: int) -> Grid:
 
     Args:
         places: (n, 3) of the surface, of all cameras.
-        voxels: how many.
+        voxels: how many, more than those of the margin.
 
     Raises:
         InputError: nothing is seen.
@@ -147,10 +157,10 @@ def grid_of(places: NDArray[np.float64], voxels: int) -> Grid:
     if not len(places):
         raise InputError("no camera sees a surface: everywhere alpha is below a half")
     low, high = np.quantile(places, (_BEYOND, 1 - _BEYOND), axis=0)
-    spacing = float((high - low).max()) / max(voxels - _MARGIN, 1)
+    spacing = float((high - low).max()) / (voxels - _MARGIN)
     if not spacing > 0:
         raise InputError("what the cameras see is a single point: there is no surface")
-    shape = np.ceil((high - low) / spacing + _MARGIN).astype(int)[::-1]
+    shape = np.ceil((high - low) / spacing - _ROUNDING + _MARGIN).astype(int)[::-1]
     return Grid(shape.tolist(), spacing, ((low + high) / 2)[::-1].tolist())
 
 

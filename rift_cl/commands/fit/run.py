@@ -6,6 +6,7 @@ they leave behind.
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator
 from typing import Any, Generic, TypeVar
 
@@ -14,14 +15,14 @@ from rift_cl.commands.fit.checkpoints import CheckpointSchedule, FitCheckpoints
 from rift_cl.commands.fit.settings import FitSettings
 from rift_cl.commands.fit_photos.scores import ViewScore
 from rift_cl.commands.run_folder.run_folder import RunFolder
-from rift_cl.errors import CheckpointError, StoppedError
+from rift_cl.errors import CheckpointError, RiftError, StoppedError
 from rift_cl.progress import Report
 from rift_cl.train.trainer import REPORT_EVERY, Trainer
 
 S = TypeVar("S", bound=FitSettings)
 
 
-class FitRun(Generic[S]):
+class FitRun(ABC, Generic[S]):
     """A fit that is planned; nothing is written yet.
 
     Args:
@@ -56,6 +57,27 @@ class FitRun(Generic[S]):
         self.decided: dict[str, Any] = {}
         self.announce: Callable[[str], None] = lambda line: None
         self._stopping = False
+
+    def run(self) -> Iterator[Report]:
+        """Do it; a report now and then.
+
+        A fit that is refused before it leaves anything leaves no folder either, so that the next
+        try is no second one.
+
+        Raises:
+            StoppedError: ``stop`` was called; a checkpoint was kept.
+        """
+        try:
+            yield from self._work()
+        except StoppedError:
+            raise
+        except RiftError:
+            self.folder.discard()
+            raise
+
+    @abstractmethod
+    def _work(self) -> Iterator[Report]:
+        """What a kind of fit does, from reading what is fitted to its report."""
 
     def stop(self) -> None:
         """Break off after the step that is being taken; ``run`` then keeps a checkpoint."""

@@ -6,14 +6,19 @@ import dataclasses
 import time
 from collections.abc import Iterator
 
-from rift_cl.commands.cameras.arc import check_places
+from rift_cl.commands.cameras.arc import check_places, place_notes
 from rift_cl.commands.cameras.fit_cameras import CAMERA_FILES, save_fit_cameras, with_poses
 from rift_cl.commands.cameras.photograph_place import place_record
 from rift_cl.commands.export.fit_page import leave_page
 from rift_cl.commands.fit.probe import TRIED, probed, time_words
 from rift_cl.commands.fit.run import FitRun
 from rift_cl.commands.fit_photos.bare_input import BareInput
-from rift_cl.commands.fit_photos.photograph_size import fitting_downscale, size_words
+from rift_cl.commands.fit_photos.comparison import compared_record, comparison_notes
+from rift_cl.commands.fit_photos.photograph_size import (
+    check_window,
+    fitting_downscale,
+    size_words,
+)
 from rift_cl.commands.fit_photos.pictures import CapturePictures
 from rift_cl.commands.fit_photos.pose_check import check_poses
 from rift_cl.commands.fit_photos.report import (
@@ -91,6 +96,8 @@ class Fit(FitRun[FitPhotosSettings]):
         }
         if len(self.tests) < len(settings.test):
             raise InputError("--test names two captures of the same name: rename one folder")
+        if isinstance(self.source, Capture):
+            self._check_sizes()
 
     def plan(self) -> dict[str, str]:
         """What would be done, by name."""
@@ -166,18 +173,14 @@ class Fit(FitRun[FitPhotosSettings]):
             words.append(f"harmonics of degree {training.degree}")
         return ", ".join([*words, *filter(None, [self.settings.basis_words()])])
 
-    def run(self) -> Iterator[Report]:
-        """Do it; a report now and then.
-
-        Raises:
-            StoppedError: ``stop`` was called; a checkpoint was kept.
-        """
+    def _work(self) -> Iterator[Report]:
         settings = self.settings
         self.folder.make()
         capture = self.source
         if isinstance(capture, BareInput):
             capture = yield from capture.find()
             self._split(capture)
+            self._check_sizes()
         for note in self._notes():
             self.announce(f"rift: {note}")
         pictures = self._pictures(self.training_views)
@@ -241,11 +244,16 @@ class Fit(FitRun[FitPhotosSettings]):
             **settings.basis_facts(),
             **({} if trainer.octaves is None else {"octaves": trainer.octaves.facts()}),
             **score_record(self.scores),
+            **compared_record(self.scores),
             **error_record(self.scores),
         }
         ramp = ramp_notes(settings, len(self.training_views))
         held_out = self.scores.get("held out", [])
-        doubts = [*brightness_notes(settings, held_out), *doubt_notes(held_out)]
+        doubts = [
+            *comparison_notes(self.scores),
+            *brightness_notes(settings, held_out),
+            *doubt_notes(held_out),
+        ]
         for note in doubts:
             self.announce(f"rift: {note}")
         octaves = octave_notes(self.metrics)
@@ -285,8 +293,8 @@ class Fit(FitRun[FitPhotosSettings]):
         settings = self.settings
         # Poses that are found here come with a sentence of how good they are.
         few = [] if isinstance(self.source, BareInput) else start_notes(capture)
-        self.capture_notes = (*capture.notes, *few)
         cameras = [view.camera for view in capture.views]
+        self.capture_notes = (*capture.notes, *few, *place_notes(cameras))
         check_places(cameras, settings.capture)
         check_poses(cameras, capture.points, settings.capture)
         self.hold_out = settings.hold_out
@@ -298,6 +306,12 @@ class Fit(FitRun[FitPhotosSettings]):
         )
         decided = self.checkpoints.decided.get("downscale")
         self.downscale = decided or fitting_downscale(self.training_views, self.device)
+
+    def _check_sizes(self) -> None:
+        """Make sure that SSIM can be had of all photographs that it is asked of."""
+        in_loss = self.training_views if self.settings.training.ssim_weight else ()
+        scored = (view for views in self._scored().values() for view in views)
+        check_window([*in_loss, *scored], self.downscale)
 
     def _notes(self) -> list[str]:
         """What was decided about the photographs, and what of them is not used."""

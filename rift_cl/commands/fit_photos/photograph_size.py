@@ -13,7 +13,9 @@ import math
 from collections.abc import Sequence
 
 from rift_cl.cl.device import Device
+from rift_cl.errors import InputError
 from rift_cl.io.captures.capture import View, camera_at
+from rift_cl.metrics.scores import SSIM_WINDOW
 
 # Most pixels of a photograph, on a processor and on a GPU.
 MOST_PIXELS = {True: 700_000, False: 1_600_000}
@@ -28,6 +30,31 @@ def fitting_downscale(views: Sequence[View], device: Device) -> int:
     """
     largest = max(view.camera.height * view.camera.width for view in views)
     return max(1, math.ceil(math.sqrt(largest / MOST_PIXELS[device.traits.is_cpu])))
+
+
+def check_window(views: Sequence[View], factor: int) -> None:
+    """Check that photographs are as large as the window of SSIM, before any work is done.
+
+    Args:
+        views: the photographs whose SSIM is in the loss or among the scores.
+        factor: by which they are made smaller.
+
+    Raises:
+        InputError: one is smaller.
+    """
+    smallest = min(views, key=lambda view: min(view.camera.size), default=None)
+    if smallest is None:
+        return
+    camera, most = camera_at(smallest, factor), min(smallest.camera.size) // SSIM_WINDOW
+    if factor <= most:
+        return
+    larger = f"take --downscale {most}" if most == 1 else f"take --downscale {most} or less"
+    raise InputError(
+        f"--downscale {factor} leaves {camera.width} x {camera.height} pixels of {smallest.name}, "
+        "and SSIM "
+        f"wants {SSIM_WINDOW} or more along each side: {f'{larger}, or ' if most else ''}do "
+        "without it in the loss (--ssim-weight 0) and in scores (--hold-out 0)"
+    )
 
 
 def size_words(views: Sequence[View], factor: int) -> str:

@@ -273,11 +273,12 @@ class CapturePictures:
         A mask's own edge may run along the object: it is no border of the photograph.
         """
         view, counted = self.views[number], self.counted(number)
-        if view.lens is not None and view.mask is not None:
+        ends_inside = view.lens is not None or view.crop_radius is not None
+        if ends_inside and view.mask is not None:
             bare = replace(view, mask=None)
             _, known = read_known_view(bare, downscale=self._downscale, light=self.light)
             return np.asarray(known) > _KNOWN
-        if view.lens is None or counted is None:
+        if not ends_inside or counted is None:
             return np.ones(self.image(number).shape[:2], bool)
         return counted
 

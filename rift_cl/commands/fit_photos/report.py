@@ -8,8 +8,9 @@ from typing import Any
 
 import numpy as np
 
+from rift_cl.commands.fit_photos.comparison import COMPARED, compared_means
 from rift_cl.commands.fit_photos.error_places_report import show_error_places
-from rift_cl.commands.fit_photos.scores import ViewScore, brightness_of, mean_scores
+from rift_cl.commands.fit_photos.scores import ViewScore, brightness_of
 from rift_cl.commands.fit_photos.settings import FitPhotosSettings
 from rift_cl.commands.pictures.evenly_spaced import evenly
 from rift_cl.report.html_page import Compared, Page
@@ -24,12 +25,15 @@ _EXPLAINED = 0.35
 # Errors are shown this much brighter.
 ERROR_GAIN = 5.0
 
-SCORING = (
+SCORING_ALONE = (
     "PSNR in dB (peak 1) and SSIM in display light, means over the pictures. The foreground is "
-    "what differs from the background by more than two codes, or what alpha says. 'nearest' and "
-    "'blend' are the nearest training picture and the mean of the two nearest: what no fit scores."
+    "what differs from the background by more than two codes, or what alpha says."
 )
-COLUMNS = ("pictures", "score", "fit", "nearest", "blend")
+SCORING = (
+    f"{SCORING_ALONE} 'nearest' and 'blend' are the nearest training picture and the mean of the "
+    "two nearest: what no fit scores. Means beside each other are over the same pictures."
+)
+COLUMNS = ("pictures", "score", *COMPARED)
 # Kinds of scores and what tables call them.
 SCORES = {
     "psnr": "PSNR",
@@ -41,14 +45,16 @@ SCORES = {
 
 
 def score_rows(metrics: Mapping[str, Any]) -> list[tuple[Any, ...]]:
-    """The table of mean scores: a row for each group of pictures and kind of score."""
-    rows = []
-    for group, values in metrics["scores"].items():
-        for kind, label in SCORES.items():
-            if f"fit_{kind}" in values:
-                cells = (values.get(f"{name}_{kind}", float("nan")) for name in COLUMNS[2:])
-                rows.append((group, label, *cells))
-    return rows
+    """The table of mean scores: a row for each group of pictures and kind of score.
+
+    None stands where nothing can be compared.
+    """
+    return [
+        (group, label, *(kinds[kind].get(name) for name in COMPARED))
+        for group, kinds in metrics["compared"].items()
+        for kind, label in SCORES.items()
+        if kind in kinds
+    ]
 
 
 def fit_page(
@@ -119,12 +125,12 @@ def brightness_notes(settings: FitPhotosSettings, scores: Sequence[ViewScore]) -
 
 def doubt_notes(scores: Sequence[ViewScore]) -> list[str]:
     """A sentence about a fit that is no better than no fit, on photographs held out."""
-    found = mean_scores(scores)
-    if "blend_psnr" not in found or found["fit_psnr"] > found["blend_psnr"]:
+    found = compared_means(scores, "psnr").means if scores else {}
+    if "blend" not in found or found["fit"] > found["blend"]:
         return []
     return [
-        f"The fit ({found['fit_psnr']:.1f} dB) is no better on held-out photographs than the mean "
-        f"of the two nearest training ones ({found['blend_psnr']:.1f} dB): it had too few steps or "
+        f"The fit ({found['fit']:.1f} dB) is no better on held-out photographs than the mean "
+        f"of the two nearest training ones ({found['blend']:.1f} dB): it had too few steps or "
         "splats, or poses, intrinsics or masks are not those of the photographs."
     ]
 
@@ -169,7 +175,7 @@ def show_fit(
 
 def _row(score: ViewScore) -> tuple[Any, ...]:
     values = score.values
-    blend = values.get("blend_psnr", float("nan"))
+    blend = values.get("blend_psnr")
     return (score.name, score.angle, values["fit_psnr"], values["fit_ssim"], blend)
 
 

@@ -148,11 +148,14 @@ def _of_samples(mask: Mask | None, truth: Floats) -> Mask | None:
 
 
 def mean_scores(scores: Sequence[ViewScore]) -> dict[str, float]:
-    """The mean of every score over the pictures that have it."""
+    """The mean of every score over the pictures that have it, and infinite ones where all are."""
     names = dict.fromkeys(name for score in scores for name in score.values)
-    return {
-        name: float(np.mean([s.values[name] for s in scores if name in s.values])) for name in names
-    }
+    return {name: _mean([s.values[name] for s in scores if name in s.values]) for name in names}
+
+
+def _mean(values: Sequence[float]) -> float:
+    finite = [value for value in values if math.isfinite(value)]
+    return float(np.mean(finite or values))
 
 
 class Brightness(NamedTuple):

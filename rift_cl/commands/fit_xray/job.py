@@ -91,12 +91,7 @@ class XrayFit(FitRun[FitXraySettings]):
             "time": time_words(seconds) + solves,
         }
 
-    def run(self) -> Iterator[Report]:
-        """Do it; a report now and then.
-
-        Raises:
-            StoppedError: ``stop`` was called; a checkpoint was kept.
-        """
+    def _work(self) -> Iterator[Report]:
         if not self.settings.resume:
             yield Report(0, self.steps, "steps")
         whole = self._read()

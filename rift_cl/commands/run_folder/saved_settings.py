@@ -143,18 +143,21 @@ def saved_settings(path: Path, job: str, settings: type[S], *, anew: bool = Fals
         job: the command that is to be run again, such as "reconstruct".
         settings: the command's settings.
         anew: as the run was asked for, without what it decided: options beside them may call for
-            other decisions. A file that was edited is taken as it stands.
+            other decisions. A file that was edited is taken as it stands. So it is with a run that
+            did not come to its end, which says no more, and whose folder is that of its file.
 
     Raises:
         InputError: the file cannot be read, is another command's or another version's, or holds a
-            setting that this version does not have or a value that it does not take.
+            setting that this version does not have or a value that it does not take; or the run is
+            unfinished and does not say what it was asked for.
     """
     # Imported when a file is named, so that a command's help loads no device layer.
     from rift_cl.io.json_fields import read_json_object
 
     try:
         record = read_json_object(path).values
-        name, values = record["job"], dict(record["settings"])
+        name, unfinished = record["job"], record.get("complete") is False
+        values = {} if unfinished else dict(record["settings"])
     except (ValueError, LookupError, TypeError) as error:
         raise InputError(
             f"--config {path}: cannot be read as the config.json of an earlier run ({error})"
@@ -167,6 +170,8 @@ def saved_settings(path: Path, job: str, settings: type[S], *, anew: bool = Fals
             "settings may mean something else: give them as options"
         )
     _doubt_parts(record.get(LOADED), path)
+    if unfinished:
+        return _unfinished_settings(path, job, settings, record.get(ASKED))
     repeated = {name: value for name, value in values.items() if name not in _NOT_REPEATED}
     where = f"--config {path}: 'rift {job}'"
     saved = _read_tree(settings, None, repeated, where, open_ended=True)
@@ -180,6 +185,20 @@ def saved_settings(path: Path, job: str, settings: type[S], *, anew: bool = Fals
     return parsed_settings(
         {**given, **files}, job, settings, where=f"--config {path}: ", open_ended=True
     )
+
+
+def _unfinished_settings(path: Path, job: str, settings: type[S], asked: Any) -> S:
+    """The settings of a run that did not come to its end, as it was asked for."""
+    where = f"--config {path}: "
+    if not isinstance(asked, dict):
+        raise InputError(
+            f"{where}is of a run that did not come to its end and does not say what it was asked "
+            "for: give its options"
+        )
+    takes = {field.name for field in dataclasses.fields(settings)}  # type: ignore[arg-type]
+    place = {"out": str(path.parent)} if "out" in takes else {}
+    given = {name: value for name, value in asked.items() if name not in _NOT_REPEATED}
+    return parsed_settings({**given, **place}, job, settings, where=where, open_ended=True)
 
 
 def digest_of(values: Any) -> str:

@@ -2,7 +2,7 @@
 
 The second line of an image holds the features found in it, and is empty where there are none. Many
 scripts leave it out altogether, so that the two are told apart by what they hold: an image ends in
-its name, features in a number.
+its name, and features are numbers throughout.
 """
 
 from __future__ import annotations
@@ -28,8 +28,8 @@ _Number = TypeVar("_Number", int, float)
 # What an image's line holds before its name, and a point's before its track.
 _BEFORE_NAME = 9
 _BEFORE_TRACK = 8
-# Numbers of a feature.
-_FEATURE = 3
+# Numbers of a feature, and words in the name of a file, which has 255 bytes at most.
+_FEATURE, _MOST_WORDS = 3, 128
 # Words in the line of a camera; no model has more.
 _LONGEST_CAMERA = 32
 
@@ -120,8 +120,10 @@ def _holds_features(where: str, line: str) -> bool:
         FileFormatError: it is neither that nor the line of another image.
     """
     words = line.split()
-    # Without an extension the name of an image may be a number as well.
-    if len(words) == _BEFORE_NAME + 1 or not is_number(words[-1]):
+    # A name may have several words and end in a number, or be one as well. A line of features may
+    # be long: what no name would reach is not looked at.
+    if_name = [*words[_BEFORE_NAME:][:_MOST_WORDS], words[-1]]
+    if len(words) == _BEFORE_NAME + 1 or not all(map(is_number, if_name)):
         return False
     if len(words) % _FEATURE:
         raise FileFormatError(

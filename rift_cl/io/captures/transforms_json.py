@@ -1,10 +1,11 @@
 """Views from a transforms.json: the flavours of NeRF's synthetic scenes, instant-ngp, nerfstudio.
 
 Intrinsics stand once for all frames or in each of them, where they take precedence. Poses are
-camera-to-world with OpenGL's axes. A lens with an opening has 'aperture_radius', 'focus_distance'
-(without it the focus is at infinity) and 'wavelength', in the poses' unit. Fields that say nothing
-about where and through what lens a photograph was taken are left alone, but for nerfstudio's lists
-of what is trained on and scored.
+camera-to-world with OpenGL's axes. Coefficients of a lens have their names, or stand in the list
+'distortion_params' of nerfstudio, whose 'fisheye_crop_radius' is the circle that a fisheye fills. A
+lens with an opening has 'aperture_radius', 'focus_distance' (without it the focus is at infinity)
+and 'wavelength', in the poses' unit. Fields that say nothing about where and through what lens a
+photograph was taken are left alone, but for nerfstudio's lists of what is trained on and scored.
 """
 
 from __future__ import annotations
@@ -30,6 +31,17 @@ from rift_cl.io.json_fields import Fields, read_json_object
 
 _COEFFICIENTS = tuple(dict.fromkeys(name for names in LENS_MODELS.values() for name in names))
 _MODELS = ("SIMPLE_PINHOLE", "PINHOLE", *LENS_MODELS)
+# The order of nerfstudio's list of coefficients, of which a fisheye has the first four.
+_LIST, _LISTED, _LISTED_OF_FISHEYE = "distortion_params", ("k1", "k2", "k3", "k4", "p1", "p2"), 4
+_CROP = "fisheye_crop_radius"
+# What instant-ngp says of cameras that are neither pinholes nor among the models, and how it calls
+# them: truth values, and the first of the coefficients.
+_OTHER_CAMERAS = {
+    "latlong": "a panorama",
+    "equirectangular": "a panorama",
+    "orthographic": "an orthographic camera",
+}
+_FTHETA = tuple(f"ftheta_p{index}" for index in range(6))
 _ALONG = {"w": "wide", "h": "high"}
 # A principal point this share of the picture from its middle is doubted: that of a picture half as
 # large lies at a quarter, those that calibrations find within a tenth.
@@ -58,6 +70,7 @@ def open_transforms(
         *(mask_notes(place, checked) if by_name else []),
         *split_notes,
         *_center_notes(path, checked),
+        *_crop_notes(path, checked),
     )
     ply = top.text("ply_file_path")
     if ply is None:
@@ -80,6 +93,18 @@ def _center_notes(path: Path, views: Sequence[View]) -> list[str]:
     ]
 
 
+def _crop_notes(path: Path, views: Sequence[View]) -> list[str]:
+    """What of fisheyes is not used because it lies outside of the circle that they fill."""
+    cropped = [view for view in views if view.crop_radius is not None]
+    if not cropped:
+        return []
+    return [
+        f"{path}: {_CROP!r} leaves out of {len(cropped)} of {len(views)} photographs what is "
+        f"farther from their middle, more than {cropped[0].crop_radius:g} pixels in "
+        f"{cropped[0].name}"
+    ]
+
+
 def _off_middle(camera: Camera) -> float:
     """How far the principal point is from the middle, as a share of the picture."""
     _, _, cx, cy = camera.intrinsics
@@ -98,7 +123,7 @@ def _view(folder: CaptureFolder, frame: Fields, top: Fields, by_name: bool) -> V
     size = _size(fields, image)
     K = _intrinsics(own, fields, size)
     pose = own.pose("transform_matrix")
-    model, coefficients = _distortion(fields)
+    model, coefficients = _distortion(own, top)
     aperture = _aperture(fields)
     with located(where):
         camera = Camera(size, K, view_of_opengl(pose), aperture=aperture)
@@ -106,7 +131,15 @@ def _view(folder: CaptureFolder, frame: Fields, top: Fields, by_name: bool) -> V
     found = None if mask is None else folder.file(where, mask)
     if by_name:
         found = mask_of(where, folder, folder.name_of(image))
-    return View(folder.name_of(image), camera, image, found, lens, own.flag("upright"))
+    return View(
+        folder.name_of(image),
+        camera,
+        image,
+        found,
+        lens,
+        own.flag("upright"),
+        crop_radius=_crop_radius(fields, model),
+    )
 
 
 def _size(fields: Fields, image: Path) -> tuple[int, int]:
@@ -178,17 +211,23 @@ def _aperture(fields: Fields) -> Aperture | None:
     return Aperture(radius, math.inf if focus is None else focus, wavelength) if radius else None
 
 
-def _distortion(fields: Fields) -> tuple[str, list[float]]:
-    """The camera model by its name in COLMAP, and its coefficients."""
-    found = {name: fields.number(name) or 0.0 for name in _COEFFICIENTS}
-    model = fields.text("camera_model")
-    if model is None:
-        model = "OPENCV_FISHEYE" if fields.flag("is_fisheye") else "OPENCV"
-    if model not in _MODELS:
-        raise FileFormatError(
-            f"{fields.where}: 'camera_model' is {reprlib.repr(model)}, known are "
-            f"{', '.join(_MODELS)}"
+def _crop_radius(fields: Fields, model: str) -> float | None:
+    """The circle that a fisheye fills; of other lenses nerfstudio does not heed it either."""
+    radius = fields.number(_CROP)
+    if radius is None or not model.endswith("_FISHEYE"):
+        return None
+    if radius <= 0:
+        raise InputError(
+            f"{fields.where}: {_CROP!r} is {radius:g}, wanted a radius in pixels of the photograph"
         )
+    return radius
+
+
+def _distortion(own: Fields, top: Fields) -> tuple[str, list[float]]:
+    """The camera model by its name in COLMAP, and its coefficients."""
+    fields = own.within(top)
+    model = _model(fields)
+    found = {**dict.fromkeys(_COEFFICIENTS, 0.0), **_said(top, model), **_said(own, model)}
     # OpenCV's five numbers are written under the name of COLMAP's four.
     takes = (*LENS_MODELS.get(model, ()), *(("k3",) if model == "OPENCV" else ()))
     extra = [name for name, value in found.items() if value and name not in takes]
@@ -200,3 +239,69 @@ def _distortion(fields: Fields) -> tuple[str, list[float]]:
     if model == "OPENCV" and found["k3"]:
         model = "FULL_OPENCV"
     return model, [found[name] for name in LENS_MODELS.get(model, ())]
+
+
+def _model(fields: Fields) -> str:
+    """The camera model by its name in COLMAP.
+
+    Raises:
+        FileFormatError: it is none of ours, or two fields disagree about it.
+    """
+    _demand_known_camera(fields)
+    model, fisheye = fields.text("camera_model"), fields.flag("is_fisheye")
+    if model is None:
+        return "OPENCV_FISHEYE" if fisheye else "OPENCV"
+    if model not in _MODELS:
+        raise FileFormatError(
+            f"{fields.where}: 'camera_model' is {reprlib.repr(model)}, known are "
+            f"{', '.join(_MODELS)}"
+        )
+    if "is_fisheye" in fields and fisheye != model.endswith("_FISHEYE"):
+        raise FileFormatError(
+            f"{fields.where}: 'camera_model' is {model} and 'is_fisheye' {str(fisheye).lower()}, "
+            "which contradict each other; leave out the wrong one"
+        )
+    return model
+
+
+def _demand_known_camera(fields: Fields) -> None:
+    """Refuse what instant-ngp calls cameras that are not among the models."""
+    for name, what in _OTHER_CAMERAS.items():
+        if fields.flag(name):
+            raise FileFormatError(
+                f"{fields.where}: {name!r} says that this is {what}, which is not read; make "
+                "pictures of pinholes of it"
+            )
+    found = [name for name in _FTHETA if name in fields]
+    if found:
+        raise FileFormatError(
+            f"{fields.where}: has {found[0]!r}, of instant-ngp's f-theta lens, which is not read; "
+            f"known are {', '.join(LENS_MODELS)}"
+        )
+
+
+def _said(source: Fields, model: str) -> dict[str, float]:
+    """The coefficients that one object holds, by name and in nerfstudio's list.
+
+    Raises:
+        FileFormatError: the list is of another length, or contradicts a name beside it.
+    """
+    numbers = ((name, source.number(name)) for name in _COEFFICIENTS)
+    named = {name: number for name, number in numbers if number is not None}
+    values = source.numbers(_LIST)
+    if values is None:
+        return named
+    lengths = [len(_LISTED)] + ([_LISTED_OF_FISHEYE] if model == "OPENCV_FISHEYE" else [])
+    if len(values) not in lengths:
+        raise FileFormatError(
+            f"{source.where}: {_LIST!r} holds {len(values)} numbers, wanted {len(_LISTED)}: "
+            f"{', '.join(_LISTED)}"
+        )
+    listed = dict(zip(_LISTED, values, strict=False))
+    for name, value in listed.items():
+        if named.get(name, value) != value:
+            raise FileFormatError(
+                f"{source.where}: {name!r} is {named[name]:g} and {value:g} in {_LIST!r}, which "
+                "contradict each other; leave out the wrong one"
+            )
+    return {**named, **listed}

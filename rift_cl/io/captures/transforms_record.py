@@ -43,12 +43,22 @@ def transforms_of(
     return {"camera_model": "PINHOLE", "frames": frames}
 
 
-def lens_fields(lens: Lens | None) -> dict[str, Any]:
-    """What a frame says of a lens that distorts; nothing where it does not."""
+def lens_fields(lens: Lens | None, crop_radius: float | None = None) -> dict[str, Any]:
+    """What a frame says of a lens that distorts; nothing where it does not.
+
+    Args:
+        lens: of its photograph.
+        crop_radius: of the circle that it fills; None where it fills all of the photograph.
+    """
     if lens is None:
         return {}
     names = LENS_MODELS[lens.model]
-    return {"camera_model": lens.model, **dict(zip(names, lens.coefficients, strict=True))}
+    circle = {} if crop_radius is None else {"fisheye_crop_radius": crop_radius}
+    return {
+        "camera_model": lens.model,
+        **dict(zip(names, lens.coefficients, strict=True)),
+        **circle,
+    }
 
 
 def _frame(camera: Camera, name: str, more: Mapping[str, Any]) -> dict[str, Any]:

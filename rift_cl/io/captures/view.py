@@ -33,6 +33,8 @@ class View:
             it is stored.
         split: what the capture wants of it: to be trained on ("train"), to be scored ("test"),
             neither ("none"); empty where it says nothing.
+        crop_radius: how far from the middle of the photograph, through its lens, it shows anything,
+            in its pixels, as fisheyes that fill a circle do; None where it does everywhere.
     """
 
     name: str
@@ -42,6 +44,7 @@ class View:
     lens: Lens | None
     upright: bool = False
     split: Split = ""
+    crop_radius: float | None = None
 
 
 @dataclass(frozen=True, eq=False, repr=False)

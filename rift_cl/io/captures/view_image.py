@@ -61,8 +61,8 @@ def read_view(
 
     Returns:
         float32 (y, x, 3), or (y, x, 4) with straight alpha where the photograph has alpha, a
-        mask or a lens. Alpha is 0 where a mask is black and where the photograph does not reach;
-        ``read_known_view`` tells these from what is transparent.
+        mask, a lens or a ``crop_radius``. Alpha is 0 where a mask is black and where the
+        photograph does not reach; ``read_known_view`` tells these from what is transparent.
 
     Raises:
         InputError: an image is missing, or an argument makes no sense.
@@ -84,8 +84,8 @@ def read_known_view(
 ) -> tuple[Image, Image | None]:
     """Read a photograph as ``read_view`` does, and beside it how much of each pixel is known.
 
-    What is transparent is known to be empty. Of what a mask hides, or what the photograph does
-    not reach once its lens is undone, nothing is known.
+    What is transparent is known to be empty. Of what a mask hides, what a fisheye does not fill of
+    its photograph, or what the photograph does not reach once its lens is undone, nothing is known.
 
     Args:
         view: one of the views of a capture.
@@ -96,7 +96,8 @@ def read_known_view(
     Returns:
         float32 (y, x, 3), or (y, x, 4) with straight alpha where the photograph has alpha of its
         own: the means of what is known of each pixel. And float32 (y, x), the share of each pixel
-        that is known, from 0 to 1; None for a photograph without mask and lens, all of which is.
+        that is known, from 0 to 1; None for a photograph without mask, lens and
+        ``crop_radius``, all of which is.
 
     Raises:
         RiftError: as ``read_view`` does.
@@ -107,10 +108,7 @@ def read_known_view(
     header = _checked_header(view, budget)
     turn = header.orientation if view.upright or header.size != view.camera.size else 1
     image = upright(read_photograph(view.image, header, budget), turn)
-    known = None
-    if view.mask is not None:
-        known = _coverage(view.mask, budget)
-        known = upright(known, turn) if known.shape == header.size else known
+    known = _known_before_lens(view, header, turn, budget)
     if downscale == 1 and view.lens is None:
         return _converted(image, linear=header.linear, wanted=light), known
     image = _converted(image, linear=header.linear, wanted="linear")
@@ -133,6 +131,26 @@ def read_known_view(
     return _converted(image, linear=True, wanted=light), known
 
 
+def _known_before_lens(
+    view: View, header: PictureHeader, turn: int, budget: int | None
+) -> Image | None:
+    """How much of each pixel of the photograph is known, before its lens is undone."""
+    known = None
+    if view.mask is not None:
+        known = _coverage(view.mask, budget)
+        known = upright(known, turn) if known.shape == header.size else known
+    if view.crop_radius is None:
+        return known
+    circle = _circle(view.camera.size, view.crop_radius)
+    return circle if known is None else np.multiply(known, circle, out=known)
+
+
+def _circle(size: tuple[int, int], radius: float) -> Image:
+    """1 within a radius of the middle of a picture, 0 outside; a pixel is where its centre is."""
+    y, x = (np.arange(extent) + 0.5 - extent / 2 for extent in size)
+    return np.asarray(np.hypot(x, y[:, np.newaxis]) < radius, np.float32)
+
+
 def _checked_header(view: View, budget: int | None) -> PictureHeader:
     """The photograph's header, once photograph and mask were found to fit the camera."""
     header = read_picture_header(view.image)
@@ -145,6 +163,8 @@ def _checked_header(view: View, budget: int | None) -> PictureHeader:
         mask = read_picture_header(view.mask)
         _demand_fit(view, view.mask, mask, mask.size in (size, header.size))
         numbers += mask.channels + 2
+    if view.crop_radius is not None:
+        numbers += 2
     need = 4 * numbers * view.camera.height * view.camera.width
     check_claim(view.image, "the view, with what it is made of,", need, budget)
     return header

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rift_cl.geometry import Camera
+from rift_cl.splat.sight import ways_to
 from rift_cl.train.per_view.quaternions import rotated
 from rift_cl.train.start.points import focus_of
 
@@ -46,7 +47,7 @@ def _mean_views(means: Floats, cameras: Sequence[Camera]) -> Floats:
     outward = means - focus_of(cameras)
     total, everywhere = np.zeros(means.shape), np.zeros(means.shape)
     for camera in cameras:
-        ways = _unit(means - camera.center)
+        ways = _unit(ways_to(camera, means))
         before = np.maximum(-(ways * _unit(outward)).sum(axis=1, keepdims=True), 0)
         total += before * ways
         everywhere += ways
