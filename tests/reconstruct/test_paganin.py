@@ -53,22 +53,27 @@ def test_thickness_is_recovered_from_simulated_propagation(generalised):
 
 
 @kernels
+@pytest.mark.parametrize("height", [1, 3])
 @pytest.mark.parametrize("shape", [(2, 5, 8), (1, 31, 46)])
-def test_it_is_the_published_formula_on_the_mirrored_image(shape, generalised):
+def test_it_is_the_published_formula_on_the_mirrored_image(shape, height, generalised):
     seen = np.random.default_rng(2).uniform(0.2, 1, shape)
     mirrored = np.concatenate([seen, seen[:, ::-1]], axis=1)
     mirrored = np.concatenate([mirrored, mirrored[:, :, ::-1]], axis=2)
     w = SETTING["pixel"]
-    ky, kx = (2 * np.pi * np.fft.fftfreq(n, w) for n in mirrored.shape[1:])
+    h = height * w
+    ky, kx = (
+        2 * np.pi * np.fft.fftfreq(n, d) for n, d in zip(mirrored.shape[1:], (h, w), strict=True)
+    )
     ky = ky[:, None]
     mu = 4 * np.pi * BETA / WAVELENGTH
     alpha = SETTING["distance"] * DELTA / mu
     squared = ky**2 + kx**2
     if generalised:
-        squared = -2 / w**2 * (np.cos(w * kx) + np.cos(w * ky) - 2)
+        squared = 2 / w**2 * (1 - np.cos(w * kx)) + 2 / h**2 * (1 - np.cos(h * ky))
     filtered = np.fft.ifft2(np.fft.fft2(mirrored) / (1 + alpha * squared)).real
     expected = -np.log(filtered[:, : shape[1], : shape[2]]) / mu
-    found = paganin(seen, **SETTING, beta=BETA, generalised=generalised)
+    setting = {**SETTING, "pixel": w if height == 1 else (h, w)}
+    found = paganin(seen, **setting, beta=BETA, generalised=generalised)
     np.testing.assert_allclose(found, expected, rtol=2e-5)
 
 
@@ -91,6 +96,12 @@ def test_a_slab_with_its_halo_equals_the_whole(distance, generalised):
     assert away[: edge - halo].max() < error
     # Nor are the rows many more than needed, where the filter is wider than a pixel.
     assert distance < 1e-2 or away[edge - halo // 2] > error
+
+
+def test_the_halo_is_counted_in_rows():
+    tall = {**SETTING, "pixel": (4 * SETTING["pixel"], SETTING["pixel"])}
+    assert halo_rows(**tall) == halo_rows(**{**SETTING, "pixel": 4 * SETTING["pixel"]})
+    assert halo_rows(**tall) != halo_rows(**SETTING)
 
 
 def test_the_halo_grows_with_distance_and_accuracy():

@@ -25,16 +25,18 @@ class Alignment:
         tilt: of the axis in the detector's plane, in radians, positive where its bin grows with
             the row.
         centers: bin of each row of the scan, in place of a tilt.
+        aspect: distance between rows over that between bins.
     """
 
     center: float
     pivot: float
     tilt: float = 0.0
     centers: NDArray[np.float64] | None = None
+    aspect: float = 1.0
 
     def halo(self, bins: int) -> int:
         """Rows that are needed on either side of those that are aligned."""
-        return tilt_halo(self.tilt, bins, self.center) if self.tilt else 0
+        return tilt_halo(self.tilt, bins, self.center, aspect=self.aspect) if self.tilt else 0
 
     def aligned(self, rows: Floats, first: int, wanted: slice, device: Device) -> Floats:
         """Rows of which the axis is at one bin.
@@ -50,7 +52,15 @@ class Alignment:
             return straightened(rows[:, wanted], centers, self.center, device=device)
         part = (wanted.start, wanted.stop)
         pivot = self.pivot - first
-        return upright(rows, self.tilt, self.center, pivot=pivot, rows=part, device=device)
+        return upright(
+            rows,
+            self.tilt,
+            self.center,
+            pivot=pivot,
+            rows=part,
+            aspect=self.aspect,
+            device=device,
+        )
 
     @property
     def words(self) -> str:

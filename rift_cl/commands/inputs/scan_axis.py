@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -53,7 +52,7 @@ def find_axis(
     geometry = scan.geometry
     try:
         if scan.cone is not None:
-            return _of_cone(scan, scan.cone, span)
+            return replace(_of_cone(scan, scan.cone, span), aspect=scan.aspect)
         if isinstance(geometry, Fan):
             row = scan.shape[1] // 2
             line = read_attenuation(scan, row, row + 1).projections[:, 0]
@@ -61,7 +60,8 @@ def find_axis(
         count = scan.shape[1]
         rows = searched_rows(count)
         sinograms = (read_attenuation(scan, row, row + 1).projections[:, 0] for row in rows)
-        return axis_of_rows(sinograms, rows, count, scan.angles, span)
+        found = axis_of_rows(sinograms, rows, count, scan.angles, span)
+        return replace(found, aspect=scan.aspect)
     except InputError as error:
         if str(error).startswith(f"{scan.path}: "):
             raise  # of the file itself, which says so
@@ -180,7 +180,7 @@ def doubted_vectors(scan: ScanFile, vectors: Vectors) -> tuple[str, ...]:
 def tilt_worth_turning(estimate: AxisEstimate, rows: int) -> float:
     """The tilt that was found, in degrees, where it is sure and moves the axis; else 0."""
     turns = estimate.tilt_is_sure and _moves(estimate, rows)
-    return math.degrees(math.atan(estimate.tilt)) if turns else 0.0
+    return estimate.degrees(estimate.tilt) if turns else 0.0
 
 
 def unsure_tilt(estimate: AxisEstimate, rows: int) -> list[str]:
@@ -188,7 +188,7 @@ def unsure_tilt(estimate: AxisEstimate, rows: int) -> list[str]:
     told = abs(estimate.tilt) > _TOLD * estimate.tilt_error and _moves(estimate, rows)
     if estimate.tilt_is_sure or not told:
         return []
-    tilt, error = (math.degrees(math.atan(slope)) for slope in (estimate.tilt, estimate.tilt_error))
+    tilt, error = (estimate.degrees(slope) for slope in (estimate.tilt, estimate.tilt_error))
     does_so = f" (--tilt {tilt:.2g} does so)" if abs(tilt) <= MOST_TILT else ""
     return [
         f"The rows' axes lie about a line that tilts by {tilt:.2g} +- {error:.2g} degrees, from "
@@ -205,12 +205,12 @@ def doubted_tilt(estimate: AxisEstimate, rows: int, given: float) -> list[str]:
         rows: of the detector that slices are made of.
         given: degrees by which projections are turned; 0 where they are not.
     """
-    other = replace(estimate, tilt=estimate.tilt - math.tan(math.radians(given)))
+    other = replace(estimate, tilt=estimate.tilt - estimate.slope(given))
     # The scatter about the line is that of what was found.
     surely = abs(other.tilt) > estimate.times_sure * estimate.tilt_error
     if not (surely and _moves(other, rows)):
         return []
-    tilt, error = (math.degrees(math.atan(slope)) for slope in (estimate.tilt, estimate.tilt_error))
+    tilt, error = (estimate.degrees(slope) for slope in (estimate.tilt, estimate.tilt_error))
     said = f"--tilt {given:g}" if given else "without --tilt"
     most = abs(other.tilt) * (rows - 1) / 2
     return [

@@ -145,6 +145,6 @@ def doubted_parallel(
 def _at_row(found: AxisEstimate, tilt: float, away: float) -> AxisEstimate:
     """What the data tell of a row away from the middle one, for the middle of the detector."""
     slope = found.tilt if found.tilt_is_sure else 0.0
-    moved = (slope - math.tan(math.radians(tilt))) * away
+    moved = (slope - found.slope(tilt)) * away
     center, low, high = (place + moved for place in (found.center, *found.interval))
     return dataclasses.replace(found, center=center, interval=(low, high))
