@@ -305,6 +305,16 @@ def test_a_tilt_is_found_with_the_axis_and_turned(tmp_path, height):
     np.testing.assert_array_equal(first, second)
 
 
+def test_a_tilt_that_is_not_turned_is_not_announced(tmp_path, capsys):
+    """An axis that drifts from row to row, by more than a detector leans."""
+    path = tilted_counts(tmp_path / "scan.h5", 20.0)
+    assert run("reconstruct", path, "--out", tmp_path / "out", "--rings", "off") == INPUT
+    said = " ".join(capsys.readouterr().err.split())
+    assert "turned by 20" not in said and "leans by 20" in said.replace("19.9", "20")
+    assert "--centers" in said and "--tilt 0" in said and not (tmp_path / "out").exists()
+    reconstruct(path, tmp_path / "left", "--rings", "off", "--tilt", 0)
+
+
 def test_each_row_may_have_an_axis_of_its_own(tmp_path):
     chance = np.random.default_rng(3)
     centers = 39.5 + chance.integers(-3, 4, ROWS)

@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rift_cl.cl.device import Device
-from rift_cl.reconstruct.preprocess import straightened, tilt_halo, upright
+from rift_cl.errors import InputError
+from rift_cl.reconstruct.preprocess import most_tilt, straightened, tilt_halo, upright
 
 Floats = NDArray[np.float32]
 
@@ -26,6 +27,9 @@ class Alignment:
             the row.
         centers: bin of each row of the scan, in place of a tilt.
         aspect: distance between rows over that between bins.
+
+    Raises:
+        InputError: the axis leans by more than projections are turned by.
     """
 
     center: float
@@ -33,6 +37,17 @@ class Alignment:
     tilt: float = 0.0
     centers: NDArray[np.float64] | None = None
     aspect: float = 1.0
+
+    def __post_init__(self) -> None:
+        """Refuse a tilt before it is announced."""
+        degrees, most = math.degrees(self.tilt), most_tilt(self.aspect)
+        if not abs(self.tilt) <= math.radians(most):
+            raise InputError(
+                f"the rotation axis leans by {degrees:.3f} degrees, and projections are turned by "
+                f"{most:.3g} at most: leave them as they are (--tilt 0), or give 'rift "
+                "reconstruct' the bin of the axis in every row (--centers), as of an axis that "
+                "drifts; a detector that leans so far must be turned"
+            )
 
     def halo(self, bins: int) -> int:
         """Rows that are needed on either side of those that are aligned."""
