@@ -225,3 +225,12 @@ def test_phase_is_retrieved_of_pixels_as_high_as_they_are(high: Path, tmp_path: 
     # Of square pixels rows are taken to be nearer than they are, and mix more.
     steepness = [float(np.abs(np.diff(v[:, 12:20, 12:20], axis=0)).mean()) for v in volumes]
     assert steepness[0] > 1.05 * steepness[1]
+
+
+def test_phase_retrieval_in_another_unit_is_doubted(high: Path, tmp_path: Path) -> None:
+    phase = ("--delta-beta", 500, "--propagation", 2e5)
+    for name, energy in (("keV", 20), ("eV", 20000)):
+        assert run(high, tmp_path / name, *phase, "--energy", energy, "--rows", 2, 3) == 0
+        assumed = json.loads((tmp_path / name / "metrics.json").read_text())["assumed"]
+        doubts = [said for said in assumed if said.startswith("Doubt: photons of")]
+        assert len(doubts) == (name == "eV")

@@ -118,6 +118,22 @@ def test_lengths_are_metres_and_energies_kev():
     assert setting.decay_length == pytest.approx(np.sqrt(0.02 * DELTA / mu))
 
 
+@pytest.mark.parametrize(
+    ("changed", "words"),
+    [
+        ({}, ""),
+        ({"energy": 20000.0}, "20000 keV"),
+        ({"distance": 2e-5}, "next to nothing"),
+        ({"pixel": 1e-3}, "next to nothing"),
+        ({"pixel": (1e-6, 1e-3)}, "next to nothing"),
+        ({"distance": 20e3}, "wider than the detector's 128 bins"),
+    ],
+)
+def test_numbers_in_another_unit_are_doubted(changed, words):
+    doubt = Propagation(**{**SETTING, **changed}).doubt(128)
+    assert words in doubt and bool(doubt) == bool(words)
+
+
 @pytest.mark.parametrize("name", list(SETTING))
 @pytest.mark.parametrize("value", [0, -1.0, float("nan"), float("inf"), None, "far"])
 def test_physical_numbers_that_are_missing_or_not_positive_are_told(name, value):

@@ -151,6 +151,8 @@ class CleanRows:
                 f"{self.phase.delta_beta:g}, {self.phase.energy:g} keV, "
                 f"{1e3 * self.phase.distance:g} mm, a filter of {blur:.3g} pixels."
             )
+            doubt = self.phase.doubt(self._scan.shape[2])
+            notes += [f"Doubt: {doubt}"] if doubt else []
         if self._settings.zingers is not None:
             notes.append(
                 "Zingers, single pixels that stand out from their neighbours by "

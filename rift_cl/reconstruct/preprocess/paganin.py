@@ -37,6 +37,9 @@ _FAINTEST = 1e-7
 _BLOCK = 64 << 20
 # A mean above this is that of counts: propagation brightens edges, and not whole projections.
 _BRIGHTEST = 2.0
+# Photons of more, in keV, are no imaging beam's. A filter that decays over less than this share of
+# a pixel keeps more than half of the finest detail: no fringes are seen that it could retrieve.
+_HARDEST, _NARROWEST = 500.0, 0.25
 # The filter's decay is followed this many of its lengths, in which it falls by 1e-17.
 _LENGTHS = 40
 _MOST_ROWS = 1 << 22
@@ -92,6 +95,26 @@ class Propagation:
     def decay_length(self) -> float:
         """The distance over which the filter blurs, sqrt(z delta / mu), in metres."""
         return math.sqrt(self.distance * self.delta_beta * self.wavelength / (4 * math.pi))
+
+    def doubt(self, bins: int) -> str:
+        """What cannot be true of these numbers, as of one in another unit; empty where nothing.
+
+        Args:
+            bins: of a detector row.
+        """
+        wide = self.decay_length / self.edges[1]
+        if self.energy > _HARDEST:
+            found = f"photons of {self.energy:g} keV are no imaging beam's"
+        elif wide < _NARROWEST:
+            found = f"a filter of {wide:.2g} pixels changes next to nothing"
+        elif wide > bins:
+            found = f"a filter of {wide:.3g} pixels is wider than the detector's {bins} bins"
+        else:
+            return ""
+        return (
+            f"{found}: are {self.energy:g} keV, a distance of {self.distance:.4g} m and pixels of "
+            f"{1e6 * self.edges[1]:.4g} um what is meant (--energy, --propagation, --pitch)?"
+        )
 
     def response(self, rows: int, bins: int) -> NDArray[np.float64]:
         """What the filter multiplies the cosine transform of (rows, bins) pixels by."""
