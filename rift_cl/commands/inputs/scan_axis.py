@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -9,6 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rift_cl.cl.device import Device
+from rift_cl.cl.discovery import open_device
+from rift_cl.commands.inputs.axis_alignment import Alignment
 from rift_cl.commands.inputs.scan_rows import read_attenuation
 from rift_cl.commands.options import MOST_TILT
 from rift_cl.errors import InputError, RiftError
@@ -233,11 +236,30 @@ def _of_cone(
         )
     groups = orbit_rows(cone)
     first, stop = int(groups[0][0]), int(groups[-1][-1]) + 1
-    read = read_attenuation(scan, first, stop).projections
+    read = _put_upright(scan, cone, first, stop)
     rows = np.stack([read[:, group - first].mean(axis=1) for group in groups], axis=1)
     places = np.array([group.mean() for group in groups])
     lying = lying_axis(_integrals_but_flats(scan, *looked_at(cone)), cone)
-    return axis_of_fan(rows, places, cone.center[0], cone.fan(), span, lying)
+    found = axis_of_fan(rows, places, cone.center[0], cone.fan(), span, lying)
+    slope = math.tan(scan.lean) * scan.aspect
+    centers = found.centers + slope * (found.rows - cone.center[0])
+    return replace(found, tilt=found.tilt + slope, centers=centers)
+
+
+def _put_upright(scan: ScanFile, cone: Cone, first: int, stop: int) -> NDArray[np.float32]:
+    """Line integrals of some rows, turned where the file says that the axis leans.
+
+    A row of a detector that leans sees the object's lower part at one end and its upper one at the
+    other, which moves the axis that opposite rays tell.
+    """
+    if not scan.lean:
+        return read_attenuation(scan, first, stop).projections
+    row, bin = cone.center
+    turn = Alignment(bin, row, scan.lean, aspect=scan.aspect)
+    halo = turn.halo(cone.bins)
+    start = max(0, first - halo)
+    around = read_attenuation(scan, start, min(scan.shape[1], stop + halo)).projections
+    return turn.aligned(around, start, slice(first - start, stop - start), open_device())
 
 
 def _integrals_but_flats(scan: ScanFile, views: list[int], rows: list[int]) -> NDArray[np.float32]:

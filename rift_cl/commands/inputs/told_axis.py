@@ -79,8 +79,12 @@ def axis_of_cone(
     axis = settled_axis(scan, cone.center[1], device)
     notes = axis.notes
     if tilt is None and axis.found is not None:
-        lean = tilt_worth_turning(axis.found, rows) or lean
-        notes = (*unsure_tilt(axis.found, rows), *notes)
+        # What the file says of the lean is kept, unless the data are sure of another.
+        slope = axis.found.slope(lean)
+        beyond = dataclasses.replace(axis.found, tilt=axis.found.tilt - slope)
+        if tilt_worth_turning(beyond, rows):
+            lean = axis.found.degrees(axis.found.tilt)
+        notes = (*(() if lean else unsure_tilt(axis.found, rows)), *notes)
     return ToldAxis(axis.center, lean, axis.turned, axis.record, notes)
 
 
