@@ -23,6 +23,8 @@ _METHODS = (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED)
 _DEFLATE_LIMIT = 1032
 _DEFLATE_SLACK = 4096
 _LISTED = 8
+# Bytes of a text that is a name or a unit, at most.
+_LONGEST_WORD = 1024
 
 
 class NpzArchive:
@@ -81,6 +83,23 @@ class NpzArchive:
         with self._archive.open(member) as file:
             values: NDArray[np.generic] = npy.read_array(file, allow_pickle=False)
         return values
+
+    def text(self, name: str) -> str:
+        """A word that an array holds; nothing where it holds numbers, or there is none."""
+        if name not in self:
+            return ""
+        member = self._members[f"{name}.npy"]
+        with self._archive.open(member) as file:
+            header = read_header(file)
+            if header.dtype.kind not in "US" or header.shape not in ((), (1,)):
+                return ""
+            if not header.size <= _LONGEST_WORD or member.file_size != header.offset + header.size:
+                raise FileFormatError(
+                    f"{self.path}: {name!r} is no word but {header.size} bytes of text, or damaged"
+                )
+        with self._archive.open(member) as file:
+            value = npy.read_array(file, allow_pickle=False).item()
+        return value.decode(errors="replace") if isinstance(value, bytes) else str(value)
 
     def names(self) -> list[str]:
         """Names of all arrays."""

@@ -221,3 +221,31 @@ def test_cones_that_no_formula_takes_are_fitted(tmp_path, kind):
     assert "cgls, sirt and tv" not in said
     assert metrics["start_error"] < 0.4
     assert metrics["scores"]["held out"]["fbp_error"] < 0.15
+
+
+def test_rows_that_are_farther_apart_than_bins_are_fitted_where_they_are(tmp_path):
+    """A scan by pixels twice as high, beside one of all rows."""
+    balls = [
+        rift.phantom.Ellipsoid((0.0, 1.0, 2.0), (9.0, 8.0, 8.0), 0.0, 0.02),
+        rift.phantom.Ellipsoid((3.0, -4.0, 3.0), (3.0, 3.0, 3.0), 0.0, 0.03),
+    ]
+    angles = np.arange(40) * np.pi / 40
+    y = rift.phantom.project(balls, rift.Grid((24, 32, 32)), rift.Parallel(angles, 32, center=15.5))
+    stacks = {1: y, 2: y.reshape(40, 12, 2, 32).mean(axis=2)}
+    means, masses, errors = {}, {}, {}
+    for height, stack in stacks.items():
+        path, out = tmp_path / f"{height}.npz", tmp_path / f"fit {height}"
+        saved(path, stack, angles, pitch=[0.5 * height, 0.5])
+        job, _, metrics = fitted(path, out, center=15.5, steps=30)
+        place, slices = read_volume_place(out / "volume.h5"), read_volume(out / "volume.h5")
+        assert place.spacing == pytest.approx((0.5 * height, 0.5, 0.5)) and place.origin[0] == 0
+        assert job.input.grid.shape == slices.shape == (24 // height, 32, 32)
+        masses[height] = slices.sum() * np.prod(place.spacing)
+        places = np.asarray(rift.SplatScene.load(out / "scene.ply").means)[:, 2]
+        # Row 0 of blocks is half a row lower than the first of their rows.
+        means[height] = float(places.mean()) + 0.25 * (height - 1)
+        errors[height] = metrics["scores"]["held out"]["fit_error"]
+    print(masses, means, errors)
+    assert masses[2] == pytest.approx(masses[1], rel=0.05)
+    assert means[2] == pytest.approx(means[1], abs=0.25)
+    assert errors[2] < 1.5 * errors[1]

@@ -14,6 +14,7 @@ from scipy.ndimage import gaussian_filter
 import rift_cl as rift
 from rift_cl.commands.cli import main
 from rift_cl.commands.inputs.scan_axis import doubted_vectors
+from rift_cl.commands.inputs.told_axis import axis_of_cone
 from rift_cl.errors import InputError
 from rift_cl.geometry import Cone, Grid, Vectors
 from rift_cl.geometry.leaning import leaning
@@ -134,6 +135,29 @@ def test_an_axis_that_leans_is_turned(tmp_path: Path, said: str) -> None:
         assert found.settings.tilt == pytest.approx(4 if name == "turned" else 0)
     off = {name: np.linalg.norm(image - smooth["upright"]) for name, image in smooth.items()}
     assert off["turned"] < 0.5 * off["untold"]
+
+
+def test_the_axis_of_a_detector_that_leans_is_found_where_it_is(tmp_path: Path) -> None:
+    """Its rows see the object's lower part at one end and its upper one at the other."""
+    parts = [
+        Ellipsoid.ball(7.0, 0.02, (0.0, 1.0, -2.0)),
+        Ellipsoid.ball(3.0, 0.03, (4.0, 6.0, 3.0)),
+        Ellipsoid.ball(2.0, 0.05, (-3.0, -7.0, 1.0)),
+    ]
+    angles = 2 * np.pi * np.arange(60) / 60
+    cone = Cone(angles, 36, 44, 1.25, R, S, (17.5, 22.2))
+    lengths = {"source_to_axis": R, "source_to_detector": S, "pitch": 1.25}
+    for lean in (4.0, -4.0):
+        views = project(parts, Grid((2, 2, 2)), leaning(cone, np.deg2rad(lean)))
+        np.savez(tmp_path / "scan.npz", projections=views, angles=angles)
+        lines = [f"{name}: {value}" for name, value in (*lengths.items(), ("lean", lean))]
+        (tmp_path / "lean.yaml").write_text("\n".join(lines))
+        geometry = str(tmp_path / "lean.yaml")
+        scan = rift.open_scan(tmp_path / "scan.npz", geometry=geometry, kind="attenuation")
+        axis = axis_of_cone(scan, None, None)
+        assert axis.center == pytest.approx(22.2, abs=0.03)
+        # What the file says of the lean is kept, where data have nothing against it.
+        assert axis.tilt == pytest.approx(lean)
 
 
 @pytest.mark.parametrize("flipped", ["across", "down"])

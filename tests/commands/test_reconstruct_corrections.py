@@ -278,7 +278,9 @@ def test_a_scan_of_one_row_is_binned_along_its_bins(tmp_path):
     assert "Blocks of 1 x 2" in notes(tmp_path / "out")
 
 
-def test_a_tilt_is_found_with_the_axis_and_turned(tmp_path):
+@pytest.mark.parametrize("height", [1, 2])
+def test_a_tilt_is_found_with_the_axis_and_turned(tmp_path, height):
+    """An angle, of rows of any height."""
     slope, rows, fine = 0.05, 24, 4
     head = [part.placed(40, (0, 2, -3)) for part in rift.phantom.SHEPP_LOGAN]
     stack = []
@@ -289,15 +291,28 @@ def test_a_tilt_is_found_with_the_axis_and_turned(tmp_path):
         # What a detector counts is the mean over a bin.
         stack.append(sharp.reshape(VIEWS, 96, fine).mean(axis=2))
     path = write_counts(tmp_path / "scan.h5", 0.02 * np.stack(stack, axis=1))
+    with h5py.File(path, "a") as file:
+        detector = file.create_group("measurement/instrument/detector")
+        detector["pixel_size_x"], detector["pixel_size_y"] = 1.0, float(height)
     reconstruct(path, tmp_path / "out", "--rings", "off")
     settings = json.loads((tmp_path / "out/config.json").read_text())["settings"]
     assert settings["center"] == pytest.approx(48.2, abs=0.1)
-    assert settings["tilt"] == pytest.approx(np.rad2deg(np.arctan(slope)), rel=0.1)
+    assert settings["tilt"] == pytest.approx(np.rad2deg(np.arctan(slope / height)), rel=0.1)
     assert "the tilt of the axis" in notes(tmp_path / "out")
     again = tmp_path / "again"
     assert run("reconstruct", "--config", tmp_path / "out/config.json", "--out", again) == 0
     first, second = (read_volume(out / "volume.h5") for out in (tmp_path / "out", again))
     np.testing.assert_array_equal(first, second)
+
+
+def test_a_tilt_that_is_not_turned_is_not_announced(tmp_path, capsys):
+    """An axis that drifts from row to row, by more than a detector leans."""
+    path = tilted_counts(tmp_path / "scan.h5", 20.0)
+    assert run("reconstruct", path, "--out", tmp_path / "out", "--rings", "off") == INPUT
+    said = " ".join(capsys.readouterr().err.split())
+    assert "turned by 20" not in said and "leans by 20" in said.replace("19.9", "20")
+    assert "--centers" in said and "--tilt 0" in said and not (tmp_path / "out").exists()
+    reconstruct(path, tmp_path / "left", "--rings", "off", "--tilt", 0)
 
 
 def test_each_row_may_have_an_axis_of_its_own(tmp_path):

@@ -14,6 +14,8 @@ from rift_cl.commands.inputs.scan_lengths import with_lengths
 from rift_cl.errors import InputError
 from rift_cl.geometry import Cone
 from rift_cl.io import open_scan, read_volume
+from rift_cl.io.volumes import read_volume_place
+from rift_cl.io.volumes.layout import VolumePlace
 
 VIEWS, BINS, INPUT = 40, 32, 3
 PITCH = 6.5e-6
@@ -43,6 +45,23 @@ def metres(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture(scope="module")
+def high(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Rows three times as far apart as bins, in millimetres: six of them, and a ball of 1 per mm.
+
+    Means over pixels of line integrals through a ball of radius 8 bins about row 2.5.
+    """
+    path = tmp_path_factory.mktemp("high") / "scan.npz"
+    fine = (np.arange(8) + 0.5) / 8 - 0.5
+    v = (3 * (np.arange(6)[:, None] - 2.5 + fine)).reshape(-1, 1)
+    u = (np.arange(BINS)[:, None] - (BINS - 1) / 2 + fine).reshape(1, -1)
+    chord = 2 * np.sqrt(np.maximum(64 - u**2 - v**2, 0)).reshape(6, 8, BINS, 8).mean(axis=(1, 3))
+    stack = np.broadcast_to(0.1 * chord, (VIEWS, 6, BINS)).astype(np.float32)
+    angles = np.arange(VIEWS) * np.pi / VIEWS
+    np.savez(path, projections=stack, angles=angles, pitch=[0.3, 0.1], unit=np.array("mm"))
+    return path
+
+
+@pytest.fixture(scope="module")
 def bare(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A scan whose file says nothing of lengths."""
     path = tmp_path_factory.mktemp("bare") / "scan.npz"
@@ -52,7 +71,7 @@ def bare(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def run(scan: Path, out: Path, *options: object) -> int:
     words = ("reconstruct", scan, "--out", out, "--kind", "attenuation", "--center", 15.5)
-    return main([str(word) for word in (*words, *options, "--format", "h5", "--quiet")])
+    return main([str(word) for word in (*words, "--format", "h5", "--quiet", *options)])
 
 
 def settings_of(out: Path) -> dict[str, object]:
@@ -122,3 +141,96 @@ def test_a_fan_and_a_cone_are_converted_whole(tmp_path: Path, rows: int) -> None
     assert (found.source_to_axis, found.source_to_detector) == (6e4, 12e4)
     with pytest.raises(InputError, match="--unit mm"):
         with_lengths(file, 1.0, None)
+
+
+def place_of(out: Path) -> VolumePlace:
+    return read_volume_place(out / "volume.h5")
+
+
+def test_slices_are_as_far_apart_as_rows(high: Path, tmp_path: Path) -> None:
+    assert run(high, tmp_path / "a") == 0
+    place, volume = place_of(tmp_path / "a"), read_volume(tmp_path / "a" / "volume.h5")
+    assert place.spacing == pytest.approx((0.3, 0.1, 0.1)) and place.origin[0] == 0
+    ball = 4 / 3 * np.pi * 0.8**3
+    assert volume.sum() * np.prod(place.spacing) == pytest.approx(ball, rel=0.05)
+    again = ("--config", tmp_path / "a" / "config.json", "--out", tmp_path / "b", "--quiet")
+    assert main([str(word) for word in ("reconstruct", *again)]) == 0
+    assert place_of(tmp_path / "b") == place
+    np.testing.assert_array_equal(read_volume(tmp_path / "b" / "volume.h5"), volume)
+
+
+@pytest.mark.parametrize(
+    ("options", "spacing", "first"),
+    [
+        (("--rows", 2, 4), (0.3, 0.1, 0.1), 0.6),
+        (("--binning", 2), (0.6, 0.2, 0.2), 0.15),
+        (("--unit", "um"), (300, 100, 100), 0),
+        (("--unit", "um", "--pitch", 50), (150, 50, 50), 0),
+        (("--pixel", 0.2), (0.3, 0.2, 0.2), 0),
+    ],
+)
+def test_the_ratio_of_rows_to_bins_is_that_of_the_file(
+    high: Path,
+    tmp_path: Path,
+    options: tuple[object, ...],
+    spacing: tuple[float, ...],
+    first: float,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    assert run(high, tmp_path / "out", *options) == 0
+    place = place_of(tmp_path / "out")
+    assert place.spacing == pytest.approx(spacing) and place.origin[0] == pytest.approx(first)
+    if "--pitch" in options:
+        assert "between rows changes alike" in " ".join(capsys.readouterr().err.split())
+
+
+def test_the_plan_names_the_height_of_voxels(
+    high: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert run(high, tmp_path / "out", "--dry-run") == 0
+    assert "0.3 x 0.1 x 0.1 mm (z, y, x)" in " ".join(capsys.readouterr().out.split())
+
+
+@pytest.mark.parametrize("format", ["tiff", "tiff-stack", "zarr", "mrc"])
+@pytest.mark.each
+def test_every_format_has_the_height_of_slices(high: Path, tmp_path: Path, format: str) -> None:
+    import mrcfile
+    import tifffile
+
+    out = tmp_path / "out"
+    assert run(high, out, "--format", format) == 0
+    if format == "zarr":
+        assert read_volume_place(out / "volume.zarr").spacing == pytest.approx((0.3, 0.1, 0.1))
+    elif format == "mrc":
+        with mrcfile.open(out / "volume.mrc") as file:
+            size = file.voxel_size
+            assert float(size.z / size.x) == pytest.approx(3)
+    else:
+        path = out / "volume.tif" if format == "tiff-stack" else next((out / "slices").iterdir())
+        with tifffile.TiffFile(path) as file:
+            assert file.imagej_metadata["spacing"] == pytest.approx(0.3)
+            count, length = file.pages[0].tags["XResolution"].value
+            assert length / count == pytest.approx(0.1)
+
+
+def test_phase_is_retrieved_of_pixels_as_high_as_they_are(high: Path, tmp_path: Path) -> None:
+    """Rows that are farther apart show less of the fringes, so that other values come out."""
+    phase = ("--delta-beta", 500, "--energy", 20, "--propagation", 2e5)
+    with np.load(high) as file:
+        arrays = dict(file)
+    square = tmp_path / "square.npz"
+    np.savez(square, **{**arrays, "pitch": 0.1})
+    assert run(high, tmp_path / "a", *phase) == run(square, tmp_path / "b", *phase) == 0
+    volumes = [read_volume(tmp_path / name / "volume.h5") for name in "ab"]
+    # Of square pixels rows are taken to be nearer than they are, and mix more.
+    steepness = [float(np.abs(np.diff(v[:, 12:20, 12:20], axis=0)).mean()) for v in volumes]
+    assert steepness[0] > 1.05 * steepness[1]
+
+
+def test_phase_retrieval_in_another_unit_is_doubted(high: Path, tmp_path: Path) -> None:
+    phase = ("--delta-beta", 500, "--propagation", 2e5)
+    for name, energy in (("keV", 20), ("eV", 20000)):
+        assert run(high, tmp_path / name, *phase, "--energy", energy, "--rows", 2, 3) == 0
+        assumed = json.loads((tmp_path / name / "metrics.json").read_text())["assumed"]
+        doubts = [said for said in assumed if said.startswith("Doubt: photons of")]
+        assert len(doubts) == (name == "eV")

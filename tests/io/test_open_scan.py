@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pickle
 from pathlib import Path
+from typing import Any
 
 import h5py
 import numpy as np
@@ -124,6 +125,43 @@ def test_nxtomo(tmp_path: Path, group: str) -> None:
     np.testing.assert_array_equal(rows.darks, data[made.KEYS == 2, 1:4])
 
 
+def sized(path: Path, name: str, value: float, unit: str = "um") -> None:
+    """Add a size of a pixel to an HDF5 file."""
+    with h5py.File(path, "a") as file:
+        file[name] = value
+        file[name].attrs["units"] = unit
+
+
+def test_nxtomo_rows_have_a_pitch_of_their_own(tmp_path: Path) -> None:
+    path, name = tmp_path / "a.nxs", "entry1/tomo_entry/instrument/detector/y_pixel_size"
+    made.nxtomo(path)
+    square = open_scan(path)
+    assert (square.row_pitch, square.aspect) == (None, 1)
+    sized(path, name, 7e-6, "m")
+    scan = open_scan(path)
+    assert (scan.pitch, scan.row_pitch) == pytest.approx((3.5, 7)) and scan.aspect == 2
+    assert "pitch 7 x 3.5 um (rows x bins)" in scan.notes[0] and "7 x 3.5 um" in repr(scan)
+    with h5py.File(path, "a") as file:
+        file[name].attrs["units"] = "furlong"
+    doubtful = open_scan(path)
+    assert doubtful.row_pitch is None and "'furlong'" in " ".join(doubtful.notes)
+
+
+def test_data_exchange_rows_have_a_pitch_of_their_own(tmp_path: Path) -> None:
+    path, detector = tmp_path / "a.h5", "measurement/instrument/detector/"
+    made.data_exchange(path)
+    sized(path, detector + "pixel_size_x", 3.0)
+    sized(path, detector + "pixel_size_y", 9.0)
+    scan = open_scan(path)
+    assert (scan.pitch, scan.row_pitch, scan.unit) == (3, 9, "um")
+    # Optics make all pixels smaller by one factor, and what is told at the sample comes first.
+    sized(path, detector + "actual_pixel_size_x", 0.5)
+    scan = open_scan(path)
+    assert scan.pitch == 0.5 and scan.row_pitch == pytest.approx(1.5)
+    sized(path, detector + "actual_pixel_size_y", 1.25)
+    assert open_scan(path).row_pitch == 1.25
+
+
 def test_several_nxtomo_scans_must_be_told_apart(tmp_path: Path) -> None:
     path = tmp_path / "a.nxs"
     made.nxtomo(path, group="first")
@@ -179,6 +217,44 @@ def test_npz(tmp_path: Path) -> None:
     assert rows.flats is not None and rows.flats.dtype == np.float32
     np.testing.assert_array_equal(rows.flats, made.counts(2, 4, 5)[:, 2:4] + 500)
     assert rows.darks is None
+
+
+@pytest.mark.parametrize(
+    ("names", "expected"),
+    [
+        ({"pitch": [0.09, 0.03]}, (0.09, 0.03)),
+        ({"pitch": 0.03}, (None, 0.03)),
+        ({"dv": 0.09, "du": 0.03}, (0.09, 0.03)),
+        ({"row_pitch": 0.09, "bin_pitch": 0.03}, (0.09, 0.03)),
+        ({"pixel_size": 0.03}, (None, 0.03)),
+        ({"pitch": [-1.0, 0.03]}, (None, 0.03)),
+        ({"pitch": [0.09, 0.0]}, (None, None)),
+    ],
+)
+def test_npz_pitches_are_read_as_those_of_cones(
+    tmp_path: Path, names: dict[str, Any], expected: tuple[float | None, float | None]
+) -> None:
+    stack = {"projections": made.counts(6, 4, 5, dtype="<f4"), "angles": np.deg2rad(made.DEGREES)}
+    for unit in ("", "mm"):
+        told = {"unit": np.array(unit)} if unit else {}
+        np.savez(tmp_path / "a.npz", **stack, **names, **told)
+        scan = open_scan(tmp_path / "a.npz", kind="attenuation")
+        assert (scan.row_pitch, scan.pitch, scan.unit) == (*expected, unit)
+    if None not in expected:
+        np.savez(tmp_path / "b.npz", **stack, **names, **told, sid=50.0, sdd=200.0)
+        cone = open_scan(tmp_path / "b.npz", kind="attenuation")
+        assert (cone.row_pitch, cone.pitch, cone.unit) == (*expected, "mm")
+        assert cone.aspect == pytest.approx(3)
+
+
+def test_npz_lengths_that_cannot_be_are_told(tmp_path: Path) -> None:
+    stack = {"projections": made.counts(6, 4, 5, dtype="<f4"), "angles": np.deg2rad(made.DEGREES)}
+    np.savez(tmp_path / "a.npz", **stack, pitch=[0.1, 0.1, 0.1])
+    with pytest.raises(ShapeError, match="'pitch' has 3 numbers"):
+        open_scan(tmp_path / "a.npz", kind="attenuation")
+    np.savez(tmp_path / "b.npz", **stack, pitch=0.1, unit=np.array("m" * 4000))
+    with pytest.raises(FileFormatError, match="'unit' is no word"):
+        open_scan(tmp_path / "b.npz", kind="attenuation")
 
 
 def test_angles_may_be_said_outside_any_file(tmp_path: Path) -> None:

@@ -334,11 +334,11 @@ def test_files_named_as_sinograms_are_not_taken_for_projections(tmp_path: Path) 
     )
 
 
-def mrc(path: Path, data: np.ndarray, tilts: np.ndarray | None = None) -> Path:
+def mrc(path: Path, data: np.ndarray, tilts: np.ndarray | None = None, height: float = 5.2) -> Path:
     """A tilt series, its angles in SerialEM's extended header."""
     with mrcfile.new(path, overwrite=True) as file:
         file.set_data(data)
-        file.voxel_size = 5.2
+        file.voxel_size = (5.2, height, 5.2)
         if tilts is not None:
             records = b"".join(struct.pack("<3h", round(100 * tilt), 1, 2) for tilt in tilts)
             file.set_extended_header(np.frombuffer(records, "V1"))
@@ -360,6 +360,9 @@ def test_tilt_series(tmp_path: Path, dtype: str) -> None:
     np.testing.assert_allclose(np.rad2deg(scan.angles), TILTS, atol=1e-6)
     np.testing.assert_array_equal(scan.read(3, 9).projections, data[:, 3:9].astype("f4"))
     assert "extended header, about the y axis" in scan.notes[1]
+    assert scan.aspect == pytest.approx(1)
+    high = open_scan(mrc(tmp_path / "b.mrc", data, TILTS, height=7.8), kind="attenuation")
+    assert high.pitch == pytest.approx(5.2) and high.aspect == pytest.approx(1.5)
 
 
 def test_tilts_beside_the_file(tmp_path: Path) -> None:

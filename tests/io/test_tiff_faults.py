@@ -199,3 +199,15 @@ def test_an_imagej_stack_that_hides_its_images(tmp_path: Path) -> None:
     tifffile.imwrite(tmp_path / "a.tif", made.frames()[0], description=text, metadata=None)
     with pytest.raises(FileFormatError, match="keeps 900"):
         open_scan(tmp_path / "a.tif")
+
+
+def test_a_compression_that_is_not_read_is_named(tmp_path: Path) -> None:
+    """A whole file by its header's word for ZSTD, which the decoder is built without."""
+    path = tmp_path / "a.tif"
+    tifffile.imwrite(path, np.zeros((5, 4, 6), "u2"), photometric="minisblack", metadata=None)
+    with tifffile.TiffFile(path, mode="r+") as file:
+        for page in file.pages:
+            page.tags["Compression"].overwrite(50000)
+    with pytest.raises(FileFormatError, match=r"compressed by ZSTD.*LZW or Deflate") as told:
+        open_scan(path, kind="counts", flats="mean")
+    assert "damaged" not in str(told.value)

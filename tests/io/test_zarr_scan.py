@@ -120,3 +120,23 @@ def test_what_is_no_scan_or_leads_astray(store, tmp_path):
     os.mkfifo(store / "angles" / "pipe")
     with pytest.raises(FileFormatError, match="neither a file"):
         open_scan(store)
+
+
+@pytest.mark.parametrize("kept", [False, True])
+def test_chunks_of_zeros_are_read_where_they_are_written(tmp_path, kept):
+    """zarr-python leaves chunks of zeros out, and the sentence says how it does not."""
+    values = np.zeros((4, 6, 8), np.float32)
+    values[:, :3, 2:6] = 0.5
+    store = zarr.open_group(tmp_path / "a.zarr", mode="w")
+    config = {"write_empty_chunks": kept}
+    array = store.create_array(
+        "projections", shape=values.shape, chunks=(4, 3, 8), dtype="f4", config=config
+    )
+    array[:] = values
+    store.create_array("angles", data=np.arange(4) * np.pi / 4, config={"write_empty_chunks": True})
+    scan = open_scan(tmp_path / "a.zarr", kind="attenuation", values=False)
+    if kept:
+        np.testing.assert_array_equal(scan.read(3, 6).projections, values[:, 3:6])
+        return
+    with pytest.raises(FileFormatError, match="'write_empty_chunks': True"):
+        scan.read(3, 6)

@@ -91,10 +91,12 @@ SPHERES = np.array(
 )
 
 
-def spheres_on_a_detector(tilt: float, rows: np.ndarray, bins: int, center: float) -> np.ndarray:
+def spheres_on_a_detector(
+    tilt: float, rows: np.ndarray, bins: int, center: float, aspect: float = 1.0
+) -> np.ndarray:
     """Line integrals through spheres, means over pixels, by a detector turned about row 0."""
     fine = (np.arange(4) + 0.5) / 4 - 0.5
-    v = (rows[:, None] + fine).reshape(-1, 1)
+    v = aspect * (rows[:, None] + fine).reshape(-1, 1)
     u = (np.arange(bins)[:, None] + fine).reshape(1, -1) - center
     t, z = u * np.cos(tilt) - v * np.sin(tilt), v * np.cos(tilt) + u * np.sin(tilt)
     stack = np.zeros((VIEWS, len(rows), bins), np.float32)
@@ -131,20 +133,49 @@ def test_slices_of_a_tilted_scan_are_those_of_an_upright_one() -> None:
     assert before < best - 0.5
 
 
-@pytest.mark.parametrize(("tilt", "pivot"), [(0.02, 25.3), (-0.08, 700.1), (0.05, -3000.7)])
+@pytest.mark.parametrize("aspect", [0.7, 2.0])
+def test_rows_of_another_height_are_turned_by_the_same_angle(aspect: float) -> None:
+    tilt, center, bins = np.deg2rad(3), 47.3, 101
+    halo = tilt_halo(tilt, bins, center, aspect=aspect)
+    first = round(30 / aspect)
+    rows = np.arange(first - halo, first + 4 + halo)
+    tilted = spheres_on_a_detector(tilt, rows, bins, center, aspect)
+    straight = spheres_on_a_detector(0.0, np.arange(first, first + 4), bins, center, aspect)
+    kept, pivot = (halo, halo + 4), halo - first
+    turned, square, before = (
+        np.abs(stack - straight).max() / straight.max()
+        for stack in (
+            upright(tilted, tilt, center, pivot=pivot, rows=kept, aspect=aspect),
+            upright(tilted, tilt, center, pivot=pivot, rows=kept),
+            tilted[:, halo : halo + 4],
+        )
+    )
+    assert turned < 0.02 and min(square, before) > 0.06
+    with pytest.raises(InputError, match="the aspect is 0"):
+        upright(tilted, tilt, center, pivot=pivot, aspect=0)
+    # Half as high, twice as many rows are crossed.
+    with pytest.raises(InputError, match=r"2\.5 degrees"):
+        upright(tilted, tilt, center, pivot=pivot, aspect=0.5)
+
+
+@pytest.mark.parametrize(
+    ("tilt", "pivot", "aspect"),
+    [(0.02, 25.3, 1), (-0.08, 700.1, 1), (0.05, -3000.7, 1), (0.02, 25.3, 0.4), (-0.08, 70.1, 3)],
+)
 def test_rows_are_the_same_bits_in_every_slab(
-    device: rift.Device, tilt: float, pivot: float
+    device: rift.Device, tilt: float, pivot: float, aspect: float
 ) -> None:
     center, bins = 30.3, 64
-    halo = tilt_halo(tilt, bins, center, away=abs(pivot) + 90)
+    halo = tilt_halo(tilt, bins, center, away=abs(pivot) + 90, aspect=aspect)
     stack = np.random.default_rng(4).standard_normal((2, 40 + 2 * halo, bins)).astype(np.float32)
     kept = (halo, halo + 40)
-    whole = upright(stack, tilt, center, pivot=halo + pivot, rows=kept, device=device)
+    set_up = {"aspect": aspect, "device": device}
+    whole = upright(stack, tilt, center, pivot=halo + pivot, rows=kept, **set_up)
     for start, stop in ((0, 8), (8, 13), (30, 31), (13, 40)):
         part = stack[:, start : stop + 2 * halo]
         rows = (halo, halo + stop - start)
         there = halo + pivot - start
-        got = upright(part, tilt, center, pivot=there, rows=rows, device=device)
+        got = upright(part, tilt, center, pivot=there, rows=rows, **set_up)
         np.testing.assert_array_equal(got, whole[:, start:stop])
 
 

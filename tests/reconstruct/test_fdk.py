@@ -280,6 +280,15 @@ def test_vectors_that_are_no_circle_are_refused_with_the_methods_that_take_them(
         fbp(Projector(GRID, replace(vectors, source=source), device=device), np.zeros(1))
 
 
+def test_a_circle_about_another_axis_is_refused_as_that(device):
+    """All sources are on one circle, so that no view may be called beside the others."""
+    vectors, away = circle(FULL[::3]).vectors(), np.array([2.0, 0, 0])
+    beside = replace(vectors, source=vectors.source + away, middle=vectors.middle + away)
+    with pytest.raises(InputError, match=r"axis x = y = 0.*another axis.*cgls") as told:
+        fbp(Projector(GRID, beside, device=device), np.zeros(1))
+    assert "others" not in str(told.value)
+
+
 def test_tilted_detectors_are_read_as_upright_ones(device):
     scan = circle(FULL[::2])
     level, random = scan.vectors(), np.random.default_rng(4)

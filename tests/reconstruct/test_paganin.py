@@ -53,22 +53,27 @@ def test_thickness_is_recovered_from_simulated_propagation(generalised):
 
 
 @kernels
+@pytest.mark.parametrize("height", [1, 3])
 @pytest.mark.parametrize("shape", [(2, 5, 8), (1, 31, 46)])
-def test_it_is_the_published_formula_on_the_mirrored_image(shape, generalised):
+def test_it_is_the_published_formula_on_the_mirrored_image(shape, height, generalised):
     seen = np.random.default_rng(2).uniform(0.2, 1, shape)
     mirrored = np.concatenate([seen, seen[:, ::-1]], axis=1)
     mirrored = np.concatenate([mirrored, mirrored[:, :, ::-1]], axis=2)
     w = SETTING["pixel"]
-    ky, kx = (2 * np.pi * np.fft.fftfreq(n, w) for n in mirrored.shape[1:])
+    h = height * w
+    ky, kx = (
+        2 * np.pi * np.fft.fftfreq(n, d) for n, d in zip(mirrored.shape[1:], (h, w), strict=True)
+    )
     ky = ky[:, None]
     mu = 4 * np.pi * BETA / WAVELENGTH
     alpha = SETTING["distance"] * DELTA / mu
     squared = ky**2 + kx**2
     if generalised:
-        squared = -2 / w**2 * (np.cos(w * kx) + np.cos(w * ky) - 2)
+        squared = 2 / w**2 * (1 - np.cos(w * kx)) + 2 / h**2 * (1 - np.cos(h * ky))
     filtered = np.fft.ifft2(np.fft.fft2(mirrored) / (1 + alpha * squared)).real
     expected = -np.log(filtered[:, : shape[1], : shape[2]]) / mu
-    found = paganin(seen, **SETTING, beta=BETA, generalised=generalised)
+    setting = {**SETTING, "pixel": w if height == 1 else (h, w)}
+    found = paganin(seen, **setting, beta=BETA, generalised=generalised)
     np.testing.assert_allclose(found, expected, rtol=2e-5)
 
 
@@ -93,6 +98,12 @@ def test_a_slab_with_its_halo_equals_the_whole(distance, generalised):
     assert distance < 1e-2 or away[edge - halo // 2] > error
 
 
+def test_the_halo_is_counted_in_rows():
+    tall = {**SETTING, "pixel": (4 * SETTING["pixel"], SETTING["pixel"])}
+    assert halo_rows(**tall) == halo_rows(**{**SETTING, "pixel": 4 * SETTING["pixel"]})
+    assert halo_rows(**tall) != halo_rows(**SETTING)
+
+
 def test_the_halo_grows_with_distance_and_accuracy():
     rows = [halo_rows(**{**SETTING, "distance": z}) for z in (0.01, 0.1, 1)]
     assert rows == sorted(set(rows))
@@ -105,6 +116,22 @@ def test_lengths_are_metres_and_energies_kev():
     # sqrt(z delta / mu) with mu = 4 pi beta / wavelength.
     mu = 4 * np.pi * BETA / setting.wavelength
     assert setting.decay_length == pytest.approx(np.sqrt(0.02 * DELTA / mu))
+
+
+@pytest.mark.parametrize(
+    ("changed", "words"),
+    [
+        ({}, ""),
+        ({"energy": 20000.0}, "20000 keV"),
+        ({"distance": 2e-5}, "next to nothing"),
+        ({"pixel": 1e-3}, "next to nothing"),
+        ({"pixel": (1e-6, 1e-3)}, "next to nothing"),
+        ({"distance": 20e3}, "wider than the detector's 128 bins"),
+    ],
+)
+def test_numbers_in_another_unit_are_doubted(changed, words):
+    doubt = Propagation(**{**SETTING, **changed}).doubt(128)
+    assert words in doubt and bool(doubt) == bool(words)
 
 
 @pytest.mark.parametrize("name", list(SETTING))

@@ -70,11 +70,15 @@ def test_neither_order_nor_rays_that_were_not_measured_count(device):
     assert variation_weight(MeasuredRays(A, seen), lost) == weight
 
 
-def test_weights_of_rays_are_those_of_the_data_term(device):
-    """Four times the data term wants four times the variation; nothing wants none."""
+def test_the_scale_of_weights_does_not_matter_to_it(device):
+    """As it does not to the solver; nothing wants none."""
     A, y, _ = measured(device, 0.05)
+    weights = np.random.default_rng(5).uniform(0.5, 1.5, y.shape)
+    weights[:, :4] = 0
+    alike = [variation_weight(A, y, weights=scale * weights) for scale in (1, 4, 2e3, 1e-3)]
+    assert alike == pytest.approx([alike[0]] * 4)
     four = variation_weight(A, y, weights=np.full(y.shape, 4.0))
-    assert four == pytest.approx(4 * variation_weight(A, y))
+    assert four == pytest.approx(variation_weight(A, y))
     assert variation_weight(A, 0 * y) == 0
     assert variation_weight(A, device.array(y)) == variation_weight(A, y)
 

@@ -138,7 +138,12 @@ class XrayInput:
         if not isinstance(scan, Parallel):
             return seen_grid(scan, 1.0)
         across = seen_bins(scan)
-        return Grid((self.rows[1] - self.rows[0], across, across))
+        return Grid((self.rows[1] - self.rows[0], across, across), (self.scan.aspect, 1.0, 1.0))
+
+    @property
+    def _row_pitch(self) -> float:
+        """Distance between rows of parallel beams, in the scan's unit."""
+        return self.pitch * self.scan.aspect
 
     @property
     def raised(self) -> float:
@@ -149,7 +154,14 @@ class XrayInput:
         """
         if self.scan.cone is not None:
             return 0.0
-        return (self.rows[0] + (self.rows[1] - self.rows[0] - 1) / 2) * self.pitch
+        return (self.rows[0] + (self.rows[1] - self.rows[0] - 1) / 2) * self._row_pitch
+
+    @property
+    def dilation(self) -> tuple[float, float, float]:
+        """Variance along (x, y, z), in bins squared, that splats gain where pixels show them."""
+        aspect = 1.0 if isinstance(self.scan.cone, Vectors) else self.scan.aspect
+        blur = self.settings.rendering.eps2d
+        return blur, blur, blur * aspect**2
 
     def _check_memory(self) -> None:
         """Refuse rows of which a fit takes more memory than there is.
@@ -167,7 +179,7 @@ class XrayInput:
                 that heights count from the detector's row 0.
         """
         z, y, x = (self.pitch * float(grid.coordinates(axis)[0]) for axis in range(3))
-        return (self.rows[0] * self.pitch if self.scan.cone is None else z), y, x
+        return (self.rows[0] * self._row_pitch if self.scan.cone is None else z), y, x
 
     @property
     def need(self) -> int:
@@ -246,7 +258,7 @@ class XrayInput:
             row, bin = scan.center
         else:
             row, bin = (self.scan.shape[1] - 1) / 2, scan.center
-        return Alignment(bin, row, math.radians(self.tilt))
+        return Alignment(bin, row, math.radians(self.tilt), aspect=self.scan.aspect)
 
     def _aligned(self, alignment: Alignment) -> Floats:
         """Line integrals of the rows, turned so that the axis is at one bin of all of them."""
@@ -284,8 +296,8 @@ class Projections:
         scan: the rays, in lengths of bins as they are seen at the axis.
         values: (V, rows, bins), times ``scale`` the line integrals.
         scale: what a value of one stands for.
-        grid: the voxels of a reconstruction, as large as bins at the axis; those of some of the
-            views are those of all.
+        grid: the voxels of a reconstruction, as large as bins at the axis, of parallel beams as
+            high as rows; those of some of the views are those of all.
     """
 
     scan: Parallel | Cone | Vectors
@@ -340,7 +352,8 @@ class Projections:
     def _ortho(self, scan: Parallel) -> Iterator[Camera]:
         """Orthographic cameras: x along the detector, y along the rotation axis."""
         _, rows, bins = self.values.shape
-        K = [[1, 0, scan.center + 0.5], [0, 1, rows / 2], [0, 0, 1]]
+        aspect = self.grid.spacing[0]
+        K = [[1, 0, scan.center + 0.5], [0, 1 / aspect, rows / 2], [0, 0, 1]]
         for cos, sin in zip(np.cos(scan.angles), np.sin(scan.angles), strict=True):
             view = np.eye(4)
             view[:3, :3] = [[cos, sin, 0], [0, 0, 1], [sin, -cos, 0]]

@@ -172,7 +172,7 @@ class XrayFit(FitRun[FitXraySettings]):
             measured.grid,
             training.splats,
             seed=training.seed,
-            dilation=settings.rendering.eps2d,
+            dilation=self.input.dilation,
             size=_SIZE,
         )
         first = Parameters.of(self.device, raw, density=True)
@@ -204,12 +204,12 @@ class XrayFit(FitRun[FitXraySettings]):
             logit_opacities=scene.logit_opacities + np.float32(log(density)),
         ).save(settings.out / "scene.ply")
         slices = density * self._voxels(splats, whole)
-        path, spacing = settings.out / VOLUME_NAMES[settings.format], (pitch,) * 3
+        path = settings.out / VOLUME_NAMES[settings.format]
         with open_volume(
             path,
             slices.shape,
             format=settings.format,
-            spacing=spacing,
+            spacing=tuple(pitch * edge for edge in whole.grid.spacing),
             unit=source.unit,
             origin=source.first_sample(whole.grid),
         ) as writer:
@@ -225,15 +225,11 @@ class XrayFit(FitRun[FitXraySettings]):
     def _voxels(self, splats: Splats, whole: Projections) -> Floats:
         """The splats on the grid; plain ones to the last bits of fits from before modes."""
         if splats.shape_modes is not None:
-            volume = voxelise(
-                self.device, splats, whole.grid, dilation=self.settings.rendering.eps2d
-            )
+            volume = voxelise(self.device, splats, whole.grid, dilation=self.input.dilation)
             return np.asarray(self.device.get(volume))
         names = ("means", "quats", "scales", "opacities")
         means, quats, scales, peaks = (
             self.device.get(getattr(splats, name)).astype(float) for name in names
         )
-        footprints = Footprints(
-            whole.grid, means, quats, scales, dilation=self.settings.rendering.eps2d
-        )
+        footprints = Footprints(whole.grid, means, quats, scales, dilation=self.input.dilation)
         return footprints.sums(peaks).astype(np.float32)

@@ -63,8 +63,9 @@ class XrayInput:
     rows: Auto[tuple[int, int]] = None
     """First detector row, and the one after the last, of parallel beams. Default: all rows."""
     pitch: Auto[float] = None
-    """Distance between detector bins of parallel beams, in --unit. Default: the file's own, or 1
-    bin."""
+    """Distance between detector bins of parallel beams, in --unit; that between rows is scaled
+    alike, and is the same where a file does not say how high its pixels are. Default: the file's
+    own, or 1 bin."""
     unit: Auto[str] = None
     """Unit of length of pitch, voxels and values: m, cm, mm, um, nm, pm, angstrom or inch. A file's
     lengths in another unit are converted to it. Default: the file's, or bin."""

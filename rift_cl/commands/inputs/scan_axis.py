@@ -10,6 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rift_cl.cl.device import Device
+from rift_cl.cl.discovery import open_device
+from rift_cl.commands.inputs.axis_alignment import Alignment
 from rift_cl.commands.inputs.scan_rows import read_attenuation
 from rift_cl.commands.options import MOST_TILT
 from rift_cl.errors import InputError, RiftError
@@ -53,7 +55,7 @@ def find_axis(
     geometry = scan.geometry
     try:
         if scan.cone is not None:
-            return _of_cone(scan, scan.cone, span)
+            return replace(_of_cone(scan, scan.cone, span), aspect=scan.aspect)
         if isinstance(geometry, Fan):
             row = scan.shape[1] // 2
             line = read_attenuation(scan, row, row + 1).projections[:, 0]
@@ -61,7 +63,8 @@ def find_axis(
         count = scan.shape[1]
         rows = searched_rows(count)
         sinograms = (read_attenuation(scan, row, row + 1).projections[:, 0] for row in rows)
-        return axis_of_rows(sinograms, rows, count, scan.angles, span)
+        found = axis_of_rows(sinograms, rows, count, scan.angles, span)
+        return replace(found, aspect=scan.aspect)
     except InputError as error:
         if str(error).startswith(f"{scan.path}: "):
             raise  # of the file itself, which says so
@@ -180,7 +183,7 @@ def doubted_vectors(scan: ScanFile, vectors: Vectors) -> tuple[str, ...]:
 def tilt_worth_turning(estimate: AxisEstimate, rows: int) -> float:
     """The tilt that was found, in degrees, where it is sure and moves the axis; else 0."""
     turns = estimate.tilt_is_sure and _moves(estimate, rows)
-    return math.degrees(math.atan(estimate.tilt)) if turns else 0.0
+    return estimate.degrees(estimate.tilt) if turns else 0.0
 
 
 def unsure_tilt(estimate: AxisEstimate, rows: int) -> list[str]:
@@ -188,7 +191,7 @@ def unsure_tilt(estimate: AxisEstimate, rows: int) -> list[str]:
     told = abs(estimate.tilt) > _TOLD * estimate.tilt_error and _moves(estimate, rows)
     if estimate.tilt_is_sure or not told:
         return []
-    tilt, error = (math.degrees(math.atan(slope)) for slope in (estimate.tilt, estimate.tilt_error))
+    tilt, error = (estimate.degrees(slope) for slope in (estimate.tilt, estimate.tilt_error))
     does_so = f" (--tilt {tilt:.2g} does so)" if abs(tilt) <= MOST_TILT else ""
     return [
         f"The rows' axes lie about a line that tilts by {tilt:.2g} +- {error:.2g} degrees, from "
@@ -205,12 +208,12 @@ def doubted_tilt(estimate: AxisEstimate, rows: int, given: float) -> list[str]:
         rows: of the detector that slices are made of.
         given: degrees by which projections are turned; 0 where they are not.
     """
-    other = replace(estimate, tilt=estimate.tilt - math.tan(math.radians(given)))
+    other = replace(estimate, tilt=estimate.tilt - estimate.slope(given))
     # The scatter about the line is that of what was found.
     surely = abs(other.tilt) > estimate.times_sure * estimate.tilt_error
     if not (surely and _moves(other, rows)):
         return []
-    tilt, error = (math.degrees(math.atan(slope)) for slope in (estimate.tilt, estimate.tilt_error))
+    tilt, error = (estimate.degrees(slope) for slope in (estimate.tilt, estimate.tilt_error))
     said = f"--tilt {given:g}" if given else "without --tilt"
     most = abs(other.tilt) * (rows - 1) / 2
     return [
@@ -233,11 +236,30 @@ def _of_cone(
         )
     groups = orbit_rows(cone)
     first, stop = int(groups[0][0]), int(groups[-1][-1]) + 1
-    read = read_attenuation(scan, first, stop).projections
+    read = _put_upright(scan, cone, first, stop)
     rows = np.stack([read[:, group - first].mean(axis=1) for group in groups], axis=1)
     places = np.array([group.mean() for group in groups])
     lying = lying_axis(_integrals_but_flats(scan, *looked_at(cone)), cone)
-    return axis_of_fan(rows, places, cone.center[0], cone.fan(), span, lying)
+    found = axis_of_fan(rows, places, cone.center[0], cone.fan(), span, lying)
+    slope = math.tan(scan.lean) * scan.aspect
+    centers = found.centers + slope * (found.rows - cone.center[0])
+    return replace(found, tilt=found.tilt + slope, centers=centers)
+
+
+def _put_upright(scan: ScanFile, cone: Cone, first: int, stop: int) -> NDArray[np.float32]:
+    """Line integrals of some rows, turned where the file says that the axis leans.
+
+    A row of a detector that leans sees the object's lower part at one end and its upper one at the
+    other, which moves the axis that opposite rays tell.
+    """
+    if not scan.lean:
+        return read_attenuation(scan, first, stop).projections
+    row, bin = cone.center
+    turn = Alignment(bin, row, scan.lean, aspect=scan.aspect)
+    halo = turn.halo(cone.bins)
+    start = max(0, first - halo)
+    around = read_attenuation(scan, start, min(scan.shape[1], stop + halo)).projections
+    return turn.aligned(around, start, slice(first - start, stop - start), open_device())
 
 
 def _integrals_but_flats(scan: ScanFile, views: list[int], rows: list[int]) -> NDArray[np.float32]:

@@ -12,7 +12,7 @@ import math
 
 from rift_cl.errors import InputError
 from rift_cl.geometry.length_units import known_units, length_unit
-from rift_cl.io.scans.scan_file import ScanFile
+from rift_cl.io.scans.scan_file import ScanFile, pitch_words
 
 # The unit of lengths that are counted in bins.
 BIN = "bin"
@@ -64,12 +64,14 @@ def _converted(scan: ScanFile, unit: str, factor: float) -> ScanFile:
     if fan is not None:
         fan = dataclasses.replace(fan, **{name: factor * getattr(fan, name) for name in lengths})
     pitch = None if scan.pitch is None else factor * scan.pitch
-    told = "" if pitch is None else f": bins are {pitch:.4g} {unit} apart"
+    row_pitch = None if scan.row_pitch is None else factor * scan.row_pitch
+    told = "" if pitch is None else f": {pitch_words(row_pitch, pitch, unit)}"
     # Two names of one unit change nothing that is worth a word.
     note = f"The file's lengths, in {scan.unit}, were converted to {unit} (--unit){told}."
     return dataclasses.replace(
         scan,
         pitch=pitch,
+        row_pitch=row_pitch,
         unit=unit,
         fan=fan,
         cone=None if scan.cone is None else scan.cone.scaled(factor),

@@ -79,8 +79,12 @@ def axis_of_cone(
     axis = settled_axis(scan, cone.center[1], device)
     notes = axis.notes
     if tilt is None and axis.found is not None:
-        lean = tilt_worth_turning(axis.found, rows) or lean
-        notes = (*unsure_tilt(axis.found, rows), *notes)
+        # What the file says of the lean is kept, unless the data are sure of another.
+        slope = axis.found.slope(lean)
+        beyond = dataclasses.replace(axis.found, tilt=axis.found.tilt - slope)
+        if tilt_worth_turning(beyond, rows):
+            lean = axis.found.degrees(axis.found.tilt)
+        notes = (*(() if lean else unsure_tilt(axis.found, rows)), *notes)
     return ToldAxis(axis.center, lean, axis.turned, axis.record, notes)
 
 
@@ -145,6 +149,6 @@ def doubted_parallel(
 def _at_row(found: AxisEstimate, tilt: float, away: float) -> AxisEstimate:
     """What the data tell of a row away from the middle one, for the middle of the detector."""
     slope = found.tilt if found.tilt_is_sure else 0.0
-    moved = (slope - math.tan(math.radians(tilt))) * away
+    moved = (slope - found.slope(tilt)) * away
     center, low, high = (place + moved for place in (found.center, *found.interval))
     return dataclasses.replace(found, center=center, interval=(low, high))

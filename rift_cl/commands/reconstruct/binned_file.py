@@ -90,6 +90,7 @@ def binned_file(scan: ScanFile, binning: int) -> ScanFile:
         shape=(views, rows // block, bins // binning),
         pitch=None if scan.pitch is None else scan.pitch * binning,
         rows=BinnedRows(scan.rows, block, binning),
+        row_pitch=None if scan.row_pitch is None else scan.row_pitch * block,
         fan=fan,
         cone=cone,
         background=-(-scan.background // binning),

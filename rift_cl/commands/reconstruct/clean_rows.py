@@ -63,7 +63,8 @@ class CleanRows:
     Args:
         scan: the scan.
         settings: what is to be corrected.
-        pixel: edge of a detector pixel in metres, as phase retrieval needs it; None if unknown.
+        pixel: height and width of a detector pixel in metres, as phase retrieval needs them; None
+            if unknown.
         device: where to compute.
 
     Raises:
@@ -74,7 +75,7 @@ class CleanRows:
         self,
         scan: ScanFile,
         settings: ReconstructSettings,
-        pixel: float | None,
+        pixel: tuple[float, float] | None,
         device: Device,
     ) -> None:
         self._scan, self._settings, self._device = scan, settings, device
@@ -144,12 +145,14 @@ class CleanRows:
         """What is corrected, a sentence each."""
         notes = []
         if self.phase is not None:
-            blur = self.phase.decay_length / self.phase.pixel
+            blur = self.phase.decay_length / self.phase.edges[1]
             notes.append(
                 f"Phase was retrieved after Paganin et al. (2002): delta/beta "
                 f"{self.phase.delta_beta:g}, {self.phase.energy:g} keV, "
                 f"{1e3 * self.phase.distance:g} mm, a filter of {blur:.3g} pixels."
             )
+            doubt = self.phase.doubt(self._scan.shape[2])
+            notes += [f"Doubt: {doubt}"] if doubt else []
         if self._settings.zingers is not None:
             notes.append(
                 "Zingers, single pixels that stand out from their neighbours by "
@@ -179,7 +182,7 @@ class CleanRows:
         wide = np.ptp(self._scan.angles) >= _RINGS_FROM and self._settings.repeat is None
         return _USUAL_RINGS if self._scan.kind != "attenuation" and wide else None
 
-    def _propagation(self, pixel: float | None) -> Propagation | None:
+    def _propagation(self, pixel: tuple[float, float] | None) -> Propagation | None:
         settings = self._settings
         given = [name for name in _PHASE if getattr(settings, name) is not None]
         if not given:

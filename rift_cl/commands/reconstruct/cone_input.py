@@ -204,7 +204,8 @@ class ConeInput:
         self.window = VolumeWindow.of(self.settings, self.geometry)
         if self.tilt and isinstance(self.geometry, Cone):
             row, bin = self.geometry.center
-            self.clean.alignment = Alignment(bin, row, math.radians(self.tilt))
+            tilt, aspect = math.radians(self.tilt), self.scan.aspect
+            self.clean.alignment = Alignment(bin, row, tilt, aspect=aspect)
         self.beyond = self._slices_beyond()
         self._check_memory()
         self._say()

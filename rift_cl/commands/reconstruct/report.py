@@ -117,7 +117,7 @@ def voxel(job: Reconstruction | ConeReconstruction) -> str:
     if isinstance(job.inversion.window, VolumeWindow):
         edges = job.inversion.window.whole.spacing
     else:
-        edges = (job.source.pitch, *(job.inversion.window.pixel,) * 2)
+        edges = (job.source.row_pitch, *(job.inversion.window.pixel,) * 2)
     alike = max(edges) - min(edges) <= 1e-6 * max(edges)
     sizes = " x ".join(f"{edge:.4g}" for edge in (edges[-1:] if alike else edges))
     named = "" if alike else " (z, y, x)"

@@ -124,8 +124,8 @@ class GeometryOptions:
     """First detector row and the one after the last; of cone beams, slices of the volume. Default:
     all."""
     pitch: Auto[float] = None
-    """Distance between detector bins, in --unit; of cone beams that between rows is scaled alike.
-    Default: that of the file, or 1."""
+    """Distance between detector bins, in --unit; that between rows is scaled alike, and is the same
+    where a file does not say how high its pixels are. Default: that of the file, or 1."""
     unit: Auto[str] = None
     """Unit of length of pitch, voxels and values: m, cm, mm, um, nm, pm, angstrom or inch. A file's
     lengths in another unit are converted to it. Default: that of the file, or bin."""

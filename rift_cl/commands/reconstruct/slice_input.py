@@ -121,7 +121,10 @@ class SliceInput:
         # Whether the object reaches beyond the farther end, too.
         self.beyond = False
         length = length_unit(self.unit)
-        pixel = None if length is None else self._pitch * length.metres
+        pixel = None
+        if length is not None:
+            across = self._pitch * length.metres
+            pixel = (across * self.scan.aspect, across)
         self.clean = CleanRows(self.scan, settings, pixel, device)
 
     @property
@@ -130,10 +133,15 @@ class SliceInput:
         return at_axis(self.geometry).pitch
 
     @property
+    def row_pitch(self) -> float:
+        """Distance between slices: that between rows at the rotation axis."""
+        return self.pitch * self.scan.aspect
+
+    @property
     def height(self) -> float:
         """Height of the first slice above the file's row 0: that of the middle of its block."""
         block = row_binning(self.file, self.settings.binning)
-        return (self.rows[0] + (block - 1) / (2 * block)) * self.pitch
+        return (self.rows[0] + (block - 1) / (2 * block)) * self.row_pitch
 
     @property
     def detector_pitch(self) -> float:
@@ -381,7 +389,7 @@ class SliceInput:
             centers = np.array([binned_center(row, self.settings.binning) for row in rows])
             return Alignment(self.geometry.center, 0.0, centers=centers)
         pivot = binned_center((self.file.shape[1] - 1) / 2, block)
-        return Alignment(self.geometry.center, pivot, tilt)
+        return Alignment(self.geometry.center, pivot, tilt, aspect=self.scan.aspect)
 
     def _sees_farther(self) -> bool:
         return not self.rebinned and is_offset(self.geometry)
@@ -455,7 +463,10 @@ def _pitch_note(source: SliceInput) -> list[str]:
         return ["No distance between detector bins is known (--pitch): lengths are in bins."]
     if given is None or own is None or math.isclose(given, own, rel_tol=1e-6):
         return []
-    return [f"--pitch {given:g} {unit} takes the place of {own:.4g} {unit}, which the file says."]
+    alike = "" if source.file.aspect == 1 else "; the distance between rows changes alike"
+    return [
+        f"--pitch {given:g} {unit} takes the place of {own:.4g} {unit}, which the file says{alike}."
+    ]
 
 
 def _fan_note(source: SliceInput) -> list[str]:

@@ -59,7 +59,7 @@ def open_slices(
         volume_path(settings),
         (source.rows[1] - source.rows[0], *window.shape),
         format=settings.format,
-        spacing=(source.pitch, window.pixel, window.pixel),
+        spacing=(source.row_pitch, window.pixel, window.pixel),
         unit=source.unit,
         origin=(source.height, *(grid.coordinates(axis)[0] for axis in (-2, -1))),
         dtype=settings.dtype,

@@ -52,6 +52,7 @@ def scan_of_arrays(
     darks: ArrayLike | None = None,
     kind: Kind | None = None,
     pitch: float | None = None,
+    row_pitch: float | None = None,
     unit: str = "",
     notes: Sequence[str] = (),
 ) -> ScanFile:
@@ -65,6 +66,7 @@ def scan_of_arrays(
         darks: frames without the beam, (n, row, bin).
         kind: what the values are; counts where there are flats, else attenuation, when not given.
         pitch: distance between bins in ``unit``, where it is known.
+        row_pitch: that between rows, where it is another one.
         unit: unit of length.
         notes: what had to be assumed, a sentence each.
 
@@ -90,6 +92,7 @@ def scan_of_arrays(
         kind=kind or ("attenuation" if flats is None else "counts"),
         source=f"{path.suffix} by a registered reader",
         rows=ArrayRows(stack, *others),
+        row_pitch=row_pitch,
         notes=tuple(notes),
     )
 

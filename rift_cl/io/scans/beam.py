@@ -79,14 +79,10 @@ class Beam:
     prefix: str = ""
     notes: tuple[str, ...] = ()
 
-    @property
-    def bin_pitch(self) -> float:
-        """Distance between bins on the detector."""
-        return self.pitch[1]
-
     def lean_over(self, rows: int) -> float:
         """``lean`` where it moves the axis by a quarter of a bin or more over so many rows."""
-        return self.lean if abs(math.tan(self.lean)) * (rows - 1) / 2 >= _CIRCULAR else 0.0
+        slope = abs(math.tan(self.lean)) * self.pitch[0] / self.pitch[1]
+        return self.lean if slope * (rows - 1) / 2 >= _CIRCULAR else 0.0
 
     def over(self, path: Path, shape: tuple[int, int, int], angles: Floats) -> Geometry:
         """The geometry of projections: a fan's of one row, otherwise a cone's, its axis upright.
@@ -197,9 +193,10 @@ class ViewVectors:
         return 0.0
 
     @property
-    def bin_pitch(self) -> float:
-        """Distance between bins on the detector, on the average over the views."""
-        return float(np.linalg.norm(self.across, axis=1).mean())
+    def pitch(self) -> tuple[float, float]:
+        """Distance between rows and between bins, on the average over the views."""
+        row, bin = (float(np.linalg.norm(v, axis=1).mean()) for v in (self.down, self.across))
+        return row, bin
 
     @property
     def angles(self) -> AngleList:

@@ -57,14 +57,14 @@ def read_beam(path: Path, pitch: tuple[float, float] | None = None, unit: str = 
 
 
 def given_beam(
-    request: ScanRequest, scan: Path, pitch: float | None = None, unit: str = ""
+    request: ScanRequest, scan: Path, pitch: tuple[float, float] | None = None, unit: str = ""
 ) -> AnyBeam | None:
     """What a person names with ``geometry=``, or None.
 
     Args:
         request: what a person says.
         scan: the scan.
-        pitch: distance between bins as the scan tells.
+        pitch: distance between rows and between bins as the scan tells.
         unit: of that.
 
     Raises:
@@ -76,7 +76,7 @@ def given_beam(
     path = next((place for place in places if place.is_file()), None)
     if path is None:
         raise InputError(f"{scan}: the geometry {request.geometry!r} is not there (--geometry)")
-    return read_beam(path, None if pitch is None else (pitch, pitch), unit)
+    return read_beam(path, pitch, unit)
 
 
 def description_in(folder: Path) -> Path | None:

@@ -30,7 +30,7 @@ from rift_cl.io.scans.kind import (
     spread,
 )
 from rift_cl.io.scans.literals import Kind
-from rift_cl.io.scans.scan_file import RowSource, ScanFile, ScanRequest
+from rift_cl.io.scans.scan_file import RowSource, ScanFile, ScanRequest, pitch_words
 
 # What ``flats`` may say in place of a name.
 AIR, MEAN = "air", "mean"
@@ -76,7 +76,7 @@ class Finding:
         evidence: names and units that may state the kind, the weightiest first.
         kind: the kind where the layout prescribes it.
         flats_at: see ``ScanFile``.
-        pitch, unit, fan, background, notes: as in ``ScanFile``.
+        pitch, row_pitch, unit, fan, background, notes: as in ``ScanFile``.
         beam: source and detector as a file tells them, where rays diverge; in place of ``fan``.
         unused: names of arrays of the projections' rows and bins that are no part of the scan.
         contents: a phrase that lists what else the file holds, or nothing.
@@ -99,6 +99,7 @@ class Finding:
     kind: Kind | None = None
     flats_at: NDArray[np.float64] | None = None
     pitch: float | None = None
+    row_pitch: float | None = None
     unit: str = ""
     fan: FanBeam | None = None
     beam: AnyBeam | None = None
@@ -122,8 +123,9 @@ def scan_of(found: Finding, request: ScanRequest) -> ScanFile:
     if found.beam is not None:
         geometry = found.beam.over(found.path, found.shape, found.angles)
         notes = (*found.notes, *found.beam.notes)
-        pitch, unit = found.beam.bin_pitch, found.beam.unit
-        found = replace(found, pitch=pitch, unit=unit, notes=notes)
+        row_pitch, pitch = found.beam.pitch
+        unit = found.beam.unit
+        found = replace(found, pitch=pitch, row_pitch=row_pitch, unit=unit, notes=notes)
     beam = geometry or found.fan
     if beam is not None:
         found = replace(found, notes=(*found.notes, *narrow_words(beam, found.shape[2])))
@@ -162,6 +164,7 @@ def scan_of(found: Finding, request: ScanRequest) -> ScanFile:
         kind=kind,
         source=found.source,
         rows=rows,
+        row_pitch=found.row_pitch,
         **_rays(found, geometry),
         background=background,
         notes=(line, *found.notes, *notes),
@@ -202,6 +205,7 @@ def _unseen(found: Finding, geometry: Geometry | None) -> ScanFile:
         kind=found.kind or "counts",
         source=found.source,
         rows=found.rows,
+        row_pitch=found.row_pitch,
         **_rays(found, geometry),
         background=found.background,
         notes=(line, *found.notes),
@@ -489,7 +493,7 @@ def _geometry(found: Finding, geometry: Geometry | None) -> str:
     sizes = " x ".join(str(stored[axis]) for axis in found.axes)
     parts = [f"axes {words(found.axes)} {sizes}", found.angle_words]
     if found.pitch is not None:
-        parts.append(f"pitch {found.pitch:.4g} {found.unit}".rstrip())
+        parts.append(pitch_words(found.row_pitch, found.pitch, found.unit))
     if geometry is not None and found.beam is not None:
         parts.append(found.beam.words(geometry))
     return "; ".join(parts)

@@ -126,7 +126,8 @@ def open_scan(
 
     HDF5 (.h5, .hdf5, .hdf, .nxs) may hold a Data Exchange scan, an NXtomo scan, or arrays that
     are named here. NPZ holds ``projections`` (angle, row, bin) or ``sinogram`` (angle, bin) and
-    ``angles`` in radians, and may hold ``flats``, ``darks`` and ``pitch``. NPY holds the
+    ``angles`` in radians, and may hold ``flats``, ``darks``, ``pitch`` (one number, or those of
+    rows and of bins) and ``unit``, the text that names the unit of lengths. NPY holds the
     projections or a sinogram alone; angles, flats and darks are files beside it that are called so,
     or are named here. MAT, of version 5 to
     7.3, holds a scan of the Helsinki Tomography Challenge, the dendrites of ToMoBAR, or arrays

@@ -21,10 +21,12 @@ from rift_cl.io.scans.hdf5_frames import Hdf5Rows
 from rift_cl.io.scans.hdf5_places import Hdf5Files, open_files
 from rift_cl.io.scans.hdf5_values import (
     axes_stated,
+    in_unit,
     numeric_shape,
     read_angles,
     read_beam,
     read_length,
+    read_pitches,
     read_vector,
     unit_of,
 )
@@ -36,12 +38,11 @@ _DATA = "/exchange/data"
 _WHITE = "/exchange/data_white"
 _DARK = "/exchange/data_dark"
 _THETA = "/exchange/theta"
-# Size of a pixel at the sample, then that of the detector itself.
-_PIXELS = (
-    "/measurement/instrument/detector/actual_pixel_size_x",
-    "/measurement/instrument/detector/pixel_size_x",
+# Sizes of a pixel along the rows and along the bins: at the sample, and of the detector itself.
+_AT_SAMPLE, _OF_DETECTOR = (
+    tuple(f"/measurement/instrument/detector/{what}pixel_size_{axis}" for axis in "yx")
+    for what in ("actual_", "")
 )
-_ROW = "/measurement/instrument/detector/pixel_size_y"
 # Of the source and of the detector from the sample.
 _DISTANCES = (
     "/measurement/instrument/source/distance",
@@ -94,22 +95,44 @@ def _layout(store: Hdf5Store, dataset: str | None) -> Layout:
 def _data_exchange(tree: Hdf5Tree) -> Layout:
     present = {name: name if tree.find(name) is not None else None for name in (_WHITE, _DARK)}
     theta = _THETA if tree.find(_THETA) is not None else None
-    lengths = (read_length(tree, name) for name in _PIXELS)
-    pixel, unit = next((length for length in lengths if length), (0.0, ""))
-    across = read_length(tree, _PIXELS[1])
-    beam, notes = read_beam(tree, _DISTANCES, (read_length(tree, _ROW), across))
+    detector = [read_length(tree, name) for name in _OF_DETECTOR]
+    pitches, doubts = read_pitches(*_at_sample(tree, *detector))
+    beam, notes = read_beam(tree, _DISTANCES, tuple(detector))
     return Layout(
         source="Data Exchange",
         projections=_DATA,
         theta=theta,
         flats=present[_WHITE],
         darks=present[_DARK],
-        pitch=usable_pitch(pixel),
-        unit=unit,
         axes={2: "nb", 3: axes_stated(tree, _DATA) or "nrb"},
         beam=beam,
-        notes=notes,
+        notes=(*doubts, *notes),
+        pitch=pitches.bin,
+        row_pitch=pitches.row,
+        unit=pitches.unit,
     )
+
+
+def _at_sample(
+    tree: Hdf5Tree, row: tuple[float, str] | None, bin: tuple[float, str] | None
+) -> tuple[tuple[float, str] | None, tuple[float, str] | None]:
+    """Sizes of a pixel at the sample where the file tells them, else those of the detector.
+
+    Optics magnify both alike, so that one of them tells the other.
+
+    Args:
+        tree: the file.
+        row: size of the detector's pixel along the rows, and its unit.
+        bin: the same along the bins.
+    """
+    seen_row, seen_bin = (read_length(tree, name) for name in _AT_SAMPLE)
+    if seen_bin is None:
+        return row, bin
+    if seen_row is None and row is not None and bin is not None:
+        height = in_unit(row, bin[1])
+        if height is not None and usable_pitch(bin[0]):
+            seen_row = height / bin[0] * seen_bin[0], seen_bin[1]
+    return seen_row, seen_bin
 
 
 @dataclass(frozen=True)

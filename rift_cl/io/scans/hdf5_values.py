@@ -14,6 +14,7 @@ from rift_cl.io.hdf5_tree import Hdf5Tree
 from rift_cl.io.scans.angle_list import AngleList, stated_unit
 from rift_cl.io.scans.axes import spelled
 from rift_cl.io.scans.beam import PARALLEL_BELOW, Beam
+from rift_cl.io.scans.scan_file import Pitches
 
 # Eight million frames: no scan has more, and a forged header may not ask for gigabytes.
 _LONGEST_VECTOR = 64 << 20
@@ -62,6 +63,27 @@ def read_length(tree: Hdf5Tree, name: str) -> tuple[float, str] | None:
     return float(read_vector(tree, name)[0]), unit_of(tree, name)
 
 
+def read_pitches(
+    row: tuple[float, str] | None, bin: tuple[float, str] | None
+) -> tuple[Pitches, tuple[str, ...]]:
+    """The sizes of a pixel along the rows and along the bins in one unit, and a note.
+
+    Args:
+        row: the first, with its unit; None where there is none.
+        bin: the second.
+    """
+    if bin is None:
+        return Pitches(), ()
+    height = None if row is None else in_unit(row, bin[1])
+    notes: tuple[str, ...] = ()
+    if row is not None and height is None:
+        notes = (
+            f"The size of a pixel along the rows is in the unit {row[1]!r}, along the bins in "
+            f"{bin[1]!r}, one of which is not known: pixels are taken to be square.",
+        )
+    return Pitches(height, bin[0], bin[1]).usable, notes
+
+
 def read_beam(
     tree: Hdf5Tree, distances: tuple[str, str], pixels: tuple[tuple[float, str] | None, ...]
 ) -> tuple[Beam | None, tuple[str, ...]]:
@@ -80,13 +102,13 @@ def read_beam(
     if to_axis is None or beyond is None or bin is None:
         return None, ()
     unit = bin[1]
-    in_unit = [_in_unit(length, unit) for length in (to_axis, beyond, row or bin, bin)]
-    if any(value is None or not math.isfinite(value) for value in in_unit) or not in_unit[0]:
+    lengths = [in_unit(length, unit) for length in (to_axis, beyond, row or bin, bin)]
+    if any(value is None or not math.isfinite(value) for value in lengths) or not lengths[0]:
         return None, (
             "The distances of source and detector are in a unit that is not known, so that they "
             "are not used: rays are taken as parallel (--geometry).",
         )
-    source, detector, pitch_row, pitch_bin = (abs(value or 0.0) for value in in_unit)
+    source, detector, pitch_row, pitch_bin = (abs(value or 0.0) for value in lengths)
     magnification = 1 + detector / source
     if magnification < PARALLEL_BELOW:
         return None, (
@@ -101,8 +123,8 @@ def read_beam(
     ), ("The pixel size is taken to be that of the detector, not that at the object.",)
 
 
-def _in_unit(length: tuple[float, str], unit: str) -> float | None:
-    """A length in another unit; as it is where neither is stated."""
+def in_unit(length: tuple[float, str], unit: str) -> float | None:
+    """A length in another unit, as it is where neither is stated; None where one is unknown."""
     value, own = length
     if own == unit:
         return value

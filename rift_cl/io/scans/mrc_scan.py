@@ -32,7 +32,14 @@ from rift_cl.io.scans.angle_list import AngleList, even_turn, file_and_column, f
 from rift_cl.io.scans.axes import axes_of
 from rift_cl.io.scans.contract import AIR, MEAN, Finding, scan_of
 from rift_cl.io.scans.frame_stack import FrameStack
-from rift_cl.io.scans.scan_file import Frames, Part, ScanFile, ScanRequest, ScanRows, usable_pitch
+from rift_cl.io.scans.scan_file import (
+    Frames,
+    Part,
+    Pitches,
+    ScanFile,
+    ScanRequest,
+    ScanRows,
+)
 
 SUFFIXES = (".mrc", ".st", ".ali", ".rec")
 _HEADER = 1024
@@ -108,7 +115,7 @@ def open_mrc_scan(path: Path, request: ScanRequest, *, budget: int | None) -> Sc
     with _opened(path) as file:
         shape = tuple(int(size) for size in file.data.shape)
         dtype = file.data.dtype
-        pixel = usable_pitch(float(file.voxel_size.x))
+        pixel = Pitches(float(file.voxel_size.y), float(file.voxel_size.x), "angstrom").usable
         angles, note = _angles(path, file, request.theta)
     axes = axes_of(
         path, path.name, shape, count=angles.count, asked=request.axes, usual=_usual(angles, shape)
@@ -126,8 +133,9 @@ def open_mrc_scan(path: Path, request: ScanRequest, *, budget: int | None) -> Sc
         angles=radians,
         angle_words=phrase,
         evidence=(path.stem,),
-        pitch=pixel,
-        unit="angstrom" if pixel else "",
+        pitch=pixel.bin,
+        row_pitch=pixel.row,
+        unit=pixel.unit if pixel.bin else "",
         notes=(note, *doubts),
         advice=_ADVICE,
     )

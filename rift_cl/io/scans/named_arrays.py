@@ -88,7 +88,7 @@ class Layout:
         fixed: the layout is known for no other axes, whatever the number of angles.
         angle_unit: unit of angles whose unit the file does not state.
         search: look beside the projections for what is not named.
-        kind, pitch, unit, fan, beam, background, notes: as in ``Finding``.
+        kind, pitch, row_pitch, unit, fan, beam, background, notes: as in ``Finding``.
     """
 
     source: str
@@ -103,11 +103,17 @@ class Layout:
     search: bool = False
     kind: Kind | None = None
     pitch: float | None = None
+    row_pitch: float | None = None
     unit: str = ""
     fan: FanBeam | None = None
     beam: AnyBeam | None = None
     background: int = 0
     notes: tuple[str, ...] = ()
+
+    @property
+    def pitches(self) -> tuple[float, float] | None:
+        """Distance between rows and between bins; pixels are square where only one is told."""
+        return None if self.pitch is None else (self.row_pitch or self.pitch, self.pitch)
 
 
 def scan_in(store: ArrayStore, layout: Layout, request: ScanRequest) -> ScanFile:
@@ -117,7 +123,7 @@ def scan_in(store: ArrayStore, layout: Layout, request: ScanRequest) -> ScanFile
         InputError: a part is missing, parts do not fit each other, or what they are is doubtful.
     """
     layout, beside = _completed(store, layout, request)
-    beam = given_beam(request, store.path, layout.pitch, layout.unit) or layout.beam
+    beam = given_beam(request, store.path, layout.pitches, layout.unit) or layout.beam
     angles = _angles(store, layout, beam)
     keys = store.vector(layout.image_key) if layout.image_key else None
     if keys is not None and layout.image_key in beside:
@@ -148,6 +154,7 @@ def scan_in(store: ArrayStore, layout: Layout, request: ScanRequest) -> ScanFile
         kind=layout.kind,
         flats_at=flats_at,
         pitch=layout.pitch,
+        row_pitch=layout.row_pitch,
         unit=layout.unit,
         fan=layout.fan,
         beam=beam,

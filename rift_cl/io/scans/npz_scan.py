@@ -18,11 +18,15 @@ from rift_cl.io.npz_archive import NpzArchive
 from rift_cl.io.scans.angle_list import AngleList, named_unit
 from rift_cl.io.scans.frame_stack import FrameStack, StackedRows
 from rift_cl.io.scans.named_arrays import scan_in
-from rift_cl.io.scans.own_layout import own_layout
+from rift_cl.io.scans.own_layout import PROJECTIONS, own_layout
 from rift_cl.io.scans.scan_file import Frames, Part, ScanFile, ScanRequest, ScanRows
 
 # Eight million projections: no scan has more, and a forged header may not ask for gigabytes.
 _LONGEST_VECTOR = 64 << 20
+
+
+# The array that names the unit of lengths.
+_UNIT = "unit"
 
 
 class NpzRows(StackedRows):
@@ -123,8 +127,8 @@ class NpzStore:
         return AngleList(name, self.vector(name), unit=named_unit(name))
 
     def unit(self, name: str) -> str:
-        """Nothing: NPZ states no units."""
-        return ""
+        """The text ``unit``, which is that of the file's lengths; of other arrays nothing."""
+        return "" if name in PROJECTIONS else self.archive.text(_UNIT)
 
     def axes(self, name: str) -> str | None:
         """None: NPZ states no axes."""

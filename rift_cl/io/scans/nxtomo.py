@@ -13,15 +13,14 @@ import h5py
 
 from rift_cl.errors import FileFormatError, InputError
 from rift_cl.io.hdf5_tree import Hdf5Tree
-from rift_cl.io.scans.hdf5_values import axes_stated, read_beam, read_length
+from rift_cl.io.scans.hdf5_values import axes_stated, read_beam, read_length, read_pitches
 from rift_cl.io.scans.named_arrays import Layout
-from rift_cl.io.scans.scan_file import usable_pitch
 
 _KEY = "instrument/detector/image_key"
 _DATA = "instrument/detector/data"
 _ANGLE = "sample/rotation_angle"
-_PIXEL = "instrument/detector/x_pixel_size"
-_ROW = "instrument/detector/y_pixel_size"
+# Along the rows, and along the bins.
+_PIXELS = ("instrument/detector/y_pixel_size", "instrument/detector/x_pixel_size")
 # Of the source, which is negative by convention, and of the detector from the sample.
 _DISTANCES = ("instrument/source/distance", "instrument/detector/distance")
 _DEEPEST = 2
@@ -65,22 +64,21 @@ def nxtomo_layout(tree: Hdf5Tree, group: str) -> Layout:
     Raises:
         InputError: the pixel size is no number.
     """
-    length = read_length(tree, f"{group}/{_PIXEL}")
-    pixel, unit = length or (0.0, "")
+    row, bin = (read_length(tree, f"{group}/{name}") for name in _PIXELS)
+    pitches, doubts = read_pitches(row, bin)
     source, detector = (f"{group}/{name}" for name in _DISTANCES)
-    beam, notes = read_beam(
-        tree, (source, detector), (read_length(tree, f"{group}/{_ROW}"), length)
-    )
+    beam, notes = read_beam(tree, (source, detector), (row, bin))
     return Layout(
         source=f"NXtomo {group or '/'}",
         projections=f"{group}/{_DATA}",
         theta=f"{group}/{_ANGLE}",
         image_key=f"{group}/{_KEY}",
         axes={2: "nb", 3: axes_stated(tree, f"{group}/{_DATA}") or "nrb"},
-        pitch=usable_pitch(pixel),
-        unit=unit,
         beam=beam,
-        notes=notes,
+        notes=(*doubts, *notes),
+        pitch=pitches.bin,
+        row_pitch=pitches.row,
+        unit=pitches.unit,
     )
 
 

@@ -1,7 +1,8 @@
 """Our own layout of a scan in a file of named arrays, NPZ or Zarr.
 
 ``projections`` (angle, row, bin) or ``sinogram`` (angle, bin), ``angles`` in radians, and where
-there are such ``flats``, ``darks``, ``pitch``, and the distances of a source with ``center``,
+there are such ``flats``, ``darks``, ``pitch`` (of rows and bins, or one number), the ``unit`` of
+lengths as the store tells it, and the distances of a source with ``center``,
 ``heights`` and ``curved``.
 """
 
@@ -13,7 +14,7 @@ from rift_cl.errors import FileFormatError, InputError, ShapeError
 from rift_cl.io.scans.axes import USUAL
 from rift_cl.io.scans.beam import Beam
 from rift_cl.io.scans.named_arrays import ArrayStore, Layout, layout_by_name
-from rift_cl.io.scans.scan_file import usable_pitch
+from rift_cl.io.scans.scan_file import Pitches
 
 PROJECTIONS = "projections", "sinogram"
 # How distances are called: from the source to the axis, from there and from the axis to the
@@ -22,6 +23,8 @@ _TO_AXIS = ("source_to_axis", "sid", "sod", "dso", "source_origin", "source_axis
 _TO_DETECTOR = ("source_to_detector", "sdd", "dsd", "source_detector")
 _BEYOND = ("odd", "dod", "origin_detector", "axis_to_detector")
 _DISTANCES = (*_TO_AXIS, *_TO_DETECTOR, *_BEYOND)
+# Numbers of a pitch that is not the same along rows and bins.
+_ROW_AND_BIN = 2
 _PITCHES = (("pitch",), ("dv", "du"), ("row_pitch", "bin_pitch"), ("pixel_size",))
 
 
@@ -44,9 +47,10 @@ def own_layout(store: ArrayStore, source: str, dataset: str | None = None) -> La
                 f"{store.path}: has neither 'projections' nor 'sinogram'; {store.contents()}"
             )
         dataset, called = named.projections, named.notes
-    pitch = float(store.vector("pitch")[0]) if "pitch" in store else 0.0
     known = dataset is None
-    beam, notes = _beam(store)
+    in_small = {name.lower(): name for name in store.beside("")}
+    lengths = _pitches(store, in_small)
+    beam, notes = _beam(store, in_small, lengths)
     return Layout(
         source=source,
         projections=dataset or usual[0],
@@ -56,15 +60,42 @@ def own_layout(store: ArrayStore, source: str, dataset: str | None = None) -> La
         axes=USUAL if known else None,
         angle_unit="radians" if "angles" in store else "degrees",
         search=True,
-        pitch=usable_pitch(pitch),
+        pitch=lengths.usable.bin,
+        row_pitch=lengths.usable.row,
+        unit=lengths.unit,
         beam=beam,
         notes=(*called, *notes),
     )
 
 
-def _beam(store: ArrayStore) -> tuple[Beam | None, tuple[str, ...]]:
+def _pitches(store: ArrayStore, named: dict[str, str]) -> Pitches:
+    """The pitch of the detector, of rays of every kind.
+
+    Args:
+        store: the arrays.
+        named: their names by the same in small letters.
+
+    Raises:
+        ShapeError: there are more numbers than those of rows and bins.
+    """
+    for names in _PITCHES:
+        if not all(name in named for name in names):
+            continue
+        values = np.concatenate([store.vector(named[name]) for name in names])
+        if values.size > _ROW_AND_BIN:
+            raise ShapeError(
+                f"{store.path}: {named[names[0]]!r} has {values.size} numbers, wanted one, or "
+                "those of rows and of bins"
+            )
+        row = float(values[0]) if values.size == _ROW_AND_BIN else None
+        return Pitches(row, float(values[-1]), store.unit(named[names[-1]]))
+    return Pitches()
+
+
+def _beam(
+    store: ArrayStore, named: dict[str, str], lengths: Pitches
+) -> tuple[Beam | None, tuple[str, ...]]:
     """Source and detector where the file names their distances, or a doubt."""
-    named = {name.lower(): name for name in store.beside("")}
     found = [named[name] for name in _DISTANCES if name in named]
     if not found:
         return None, ()
@@ -81,8 +112,7 @@ def _beam(store: ArrayStore) -> tuple[Beam | None, tuple[str, ...]]:
             f"The file names one distance of a source ({listed}) and not the other, so that it is "
             "not used: rays are taken as parallel. Give both with geometry= (--geometry).",
         )
-    pitch = _pitch(store, named)
-    if pitch is None:
+    if lengths.bin is None:
         raise InputError(
             f"{store.path}: names distances of a source ({listed}) and no pitch of the detector "
             "in the same unit: add 'pitch' (or 'dv' and 'du'), or give geometry= (--geometry)"
@@ -103,7 +133,8 @@ def _beam(store: ArrayStore) -> tuple[Beam | None, tuple[str, ...]]:
     return Beam(
         source_to_axis=to_axis,
         source_to_detector=to_detector,
-        pitch=pitch,
+        pitch=(lengths.bin if lengths.row is None else lengths.row, lengths.bin),
+        unit=lengths.unit,
         center=center,
         heights=heights,
         curved=bool(curved),
@@ -112,12 +143,3 @@ def _beam(store: ArrayStore) -> tuple[Beam | None, tuple[str, ...]]:
 
 def _first_number(store: ArrayStore, named: dict[str, str], names: tuple[str, ...]) -> float | None:
     return next((float(store.vector(named[n])[0]) for n in names if n in named), None)
-
-
-def _pitch(store: ArrayStore, named: dict[str, str]) -> tuple[float, float] | None:
-    """Distance between rows and between bins."""
-    for names in _PITCHES:
-        if all(name in named for name in names):
-            values = np.concatenate([store.vector(named[name]) for name in names])
-            return float(values[0]), float(values[-1])
-    return None

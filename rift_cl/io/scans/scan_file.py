@@ -7,10 +7,11 @@ file: it can be sent to another process.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal, Protocol
+from typing import Literal, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,10 +19,34 @@ from numpy.typing import NDArray
 from rift_cl.errors import InputError, NonFiniteError, ShapeError
 from rift_cl.geometry import Cone, Fan, FanBeam, Parallel, Scan, Vectors
 from rift_cl.geometry.leaning import leaning
+from rift_cl.geometry.seen_grid import scan_lengths
 from rift_cl.io.scans.literals import AngleUnit, Kind
 
 Frames = NDArray[np.float32]
 Part = Literal["projections", "flats", "darks"]
+# Rows and bins whose distances differ by less than this share are as far apart.
+_ALIKE = 1e-6
+
+
+class Pitches(NamedTuple):
+    """Sizes of a detector pixel.
+
+    Args:
+        row: distance between rows; None where it is not told.
+        bin: distance between bins; None where it is not told.
+        unit: of both, empty where it is not told.
+    """
+
+    row: float | None = None
+    bin: float | None = None
+    unit: str = ""
+
+    @property
+    def usable(self) -> Pitches:
+        """The same without numbers that are no sizes, and without rows where bins have none."""
+        bin = None if self.bin is None else usable_pitch(self.bin)
+        row = None if self.row is None or bin is None else usable_pitch(self.row)
+        return Pitches(row, bin, self.unit)
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,6 +122,8 @@ class ScanFile:
             the beam, which wants -log; or "attenuation", line integrals.
         source: the layout that was recognised, for people.
         rows: reads the rows.
+        row_pitch: distance between detector rows in ``unit``; None where the file tells none, or no
+            ``pitch``, and pixels are taken to be square.
         fan: source and detector where the rays are those of a fan beam; its lengths are in
             ``unit``, and ``pitch`` is its pitch, on the detector. None for other rays.
         cone: source and detector where the rays are those of a cone beam, of which no row is
@@ -122,6 +149,7 @@ class ScanFile:
     kind: Kind
     source: str
     rows: RowSource
+    row_pitch: float | None = None
     fan: FanBeam | None = None
     cone: Cone | Vectors | None = None
     lean: float = 0.0
@@ -135,11 +163,19 @@ class ScanFile:
         low, high = np.rad2deg([self.angles.min(), self.angles.max()])
         beam = "parallel" if self.fan is None else "fan-beam"
         beam = beam if self.cone is None else "cone-beam"
-        pitch = "" if self.pitch is None else f", pitch {self.pitch:.4g} {self.unit}".rstrip()
+        pitch = pitch_words(self.row_pitch, self.pitch, self.unit)
         return (
             f"<ScanFile {self.path}: {views} {beam} views from {low:.4g} to {high:.4g} degrees, "
-            f"{rows} rows of {bins} bins{pitch}, {self.kind}>"
+            f"{rows} rows of {bins} bins{pitch and f', {pitch}'}, {self.kind}>"
         )
+
+    @property
+    def aspect(self) -> float:
+        """Distance between rows over that between bins; 1 where the file does not tell."""
+        if self.cone is not None:
+            rows, bins = scan_lengths(self.cone).pitch
+            return rows / bins
+        return self.row_pitch / self.pitch if self.row_pitch and self.pitch else 1.0
 
     @property
     def geometry(self) -> Scan:
@@ -194,6 +230,15 @@ def check_angles(
         raise NonFiniteError(f"{path}: angle {bad[0]} of {name!r} is {angles[bad[0]]}")
     angles.flags.writeable = False
     return angles
+
+
+def pitch_words(row: float | None, bin: float | None, unit: str) -> str:
+    """A phrase about the distances between rows and between bins; empty where none is known."""
+    if bin is None:
+        return ""
+    if row is None or math.isclose(row, bin, rel_tol=_ALIKE):
+        return f"pitch {bin:.4g} {unit}".rstrip()
+    return f"pitch {row:.4g} x {bin:.4g} {unit}".rstrip() + " (rows x bins)"
 
 
 def usable_pitch(value: float) -> float | None:

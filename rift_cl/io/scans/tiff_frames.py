@@ -37,6 +37,8 @@ _DTYPES = {
     "float": "f4",
     "double": "f8",
 }
+# What libtiff says of a compression that it was built without, after its name.
+_NOT_CONFIGURED = " compression support is not configured"
 
 
 @dataclass(frozen=True)
@@ -144,15 +146,23 @@ def _pages(path: Path, source: Any, first: tuple[Any, ...]) -> int:
         count = len(TiffChain(file).pages())
     for page in range(1, count):
         if not source.seek_subimage(page, 0):
-            raise FileFormatError(f"{path}: page {page} is damaged ({_complaint(source)})")
+            raise _unreadable(path, page, first_line(source.geterror()))
         _demand_same(path, page, _checked(path, page, source.spec()), first, path)
     if count == 1:
         _demand_no_hyperstack(path, source.spec().get_string_attribute("ImageDescription"))
     return count
 
 
-def _complaint(source: Any) -> str:
-    return first_line(source.geterror()) or "OpenImageIO gives no reason"
+def _unreadable(path: Path, page: int, message: str) -> FileFormatError:
+    """What is wrong with a page that the decoder refuses, in its own words."""
+    codec, configured, _ = message.partition(_NOT_CONFIGURED)
+    if configured:
+        return FileFormatError(
+            f"{path}: page {page} is compressed by {codec.split()[-1]}, which the decoder here "
+            "does not read: save the images again without compression, or with LZW or Deflate"
+        )
+    reason = message or "OpenImageIO gives no reason"
+    return FileFormatError(f"{path}: page {page} is damaged ({reason})")
 
 
 def _demand_no_hyperstack(path: Path, description: str) -> None:
@@ -246,7 +256,7 @@ def _block(
             doubles = Float64Pages(path)
             for place, page in places:
                 if not source.seek_subimage(page, 0):
-                    raise FileFormatError(f"{path}: page {page} is damaged ({_complaint(source)})")
+                    raise _unreadable(path, page, first_line(source.geterror()))
                 spec = source.spec()
                 found = _checked(path, page, spec)
                 _demand_same(path, page, found, (stack.size, stack.dtype), path)
@@ -289,7 +299,7 @@ def _decoded(path: Path, source: Any, page: int, start: int, stop: int) -> NDArr
         pixels = source.read_scanlines(page, 0, spec.y + first, spec.y + last, 0, 0, 1, kind)
     message = first_line(source.geterror())
     if pixels is None or message:
-        raise FileFormatError(f"{path}: page {page} is damaged ({message})")
+        raise _unreadable(path, page, message)
     values = np.asarray(pixels).reshape(last - first, wide)[start - first : stop - first]
     # OpenImageIO turns 8-bit codes over where 0 is shown as white; a count is what is stored.
     if kind == "uint8" and spec.get_int_attribute("tiff:PhotometricInterpretation", 1) == 0:

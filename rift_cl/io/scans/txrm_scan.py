@@ -126,7 +126,7 @@ def open_txrm_scan(path: Path, request: ScanRequest, *, budget: int | None) -> S
                 "(.txt, .csv, .npy)"
             )
         angles = given
-    beam = given_beam(request, path, pixel, "um") or cone
+    beam = given_beam(request, path, None if pixel is None else (pixel, pixel), "um") or cone
     if beam is not None and request.theta is None and beam.angles is not None:
         angles = beam.angles
     radians, phrase, doubts = angles.settled(path, views, request.angle_unit)

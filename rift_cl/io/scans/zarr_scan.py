@@ -335,6 +335,8 @@ def _check_chunks(place: Path, array: Any, selection: tuple[slice, ...]) -> None
         name = separator.join([*prefix, *map(str, numbers)])
         if not (place / name).is_file():
             raise FileFormatError(
-                f"{place}: the chunk {name} is missing, which Zarr takes for zeros; copy the store "
-                "again, or write it with write_empty_chunks"
+                f"{place}: the chunk {name} is missing, which Zarr takes for zeros, as a chunk of "
+                "zeros alone that zarr-python left out, or one that was lost: write the array with "
+                "config={'write_empty_chunks': True} (write_empty_chunks=True in zarr 2), or copy "
+                "the store again"
             )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from importlib import import_module
 from typing import Any
@@ -38,6 +39,7 @@ class AxisEstimate:
             say nothing and greatest at the best.
         sense: of rotation, as fans and cones tell it; None for parallel beams, which do not.
         doubt: what the data have against the scan's angles or lengths; empty where nothing.
+        aspect: distance between rows over that between bins.
     """
 
     center: float
@@ -51,6 +53,15 @@ class AxisEstimate:
     scores: Floats
     sense: Sense | None = None
     doubt: str = ""
+    aspect: float = 1.0
+
+    def degrees(self, slope: float) -> float:
+        """The angle of an axis that moves by so many bins from one row to the next."""
+        return math.degrees(math.atan(slope / self.aspect))
+
+    def slope(self, degrees: float) -> float:
+        """By how many bins an axis at this angle moves from one row to the next."""
+        return math.tan(math.radians(degrees)) * self.aspect
 
     @property
     def tilt_error(self) -> float:

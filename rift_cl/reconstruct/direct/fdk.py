@@ -65,7 +65,8 @@ class FDK(Composite):
 
     Args:
         A: the projector whose grid and scan to use. The detectors of ``Vectors`` may be tilted,
-            rolled and shifted in every view, as long as the source goes round a circle.
+            rolled and shifted in every view, as long as the source goes round the axis, x = y = 0,
+            on a circle.
         filter: along the detector's rows, as ``fbp`` takes it.
         compensate: what each view stands for: None, ``voronoi`` or ``uniform``, see ``redundancy``.
 

@@ -32,7 +32,7 @@ def upright_cone(scan: Vectors) -> tuple[Cone, Floats]:
     """The cone whose detectors are upright in the place of those of a scan, and where they meet.
 
     Args:
-        scan: places of source and detector; the source goes round the axis on a circle.
+        scan: places of source and detector; the source goes round the axis, x = y = 0, on a circle.
 
     Returns:
         The cone, with ``FINER`` times as many bins where views are read between theirs, and
@@ -40,7 +40,8 @@ def upright_cone(scan: Vectors) -> tuple[Cone, Floats]:
         columns of the cone's detectors to those of the scan's, and back.
 
     Raises:
-        InputError: a source stands beside the circle; the sentence names the first such view.
+        InputError: a source stands beside a circle about the axis; the sentence names the first
+            such view.
     """
     radii = np.hypot(scan.source[:, 0], scan.source[:, 1])
     radius, height = float(np.median(radii)), float(np.median(scan.source[:, 2]))
@@ -48,8 +49,10 @@ def upright_cone(scan: Vectors) -> tuple[Cone, Floats]:
     if (off > _CIRCLE * radius).any():
         view = int(np.flatnonzero(off > _CIRCLE * radius)[0])
         raise InputError(
-            f"Vectors: the source of view {view} stands {off[view]:.3g} beside the circle of the "
-            f"others, {_CIRCLE * radius:.3g} is allowed"
+            f"Vectors: the source of view {view} stands {off[view]:.3g} beside the circle of "
+            f"radius {radius:.4g} about the axis x = y = 0 at z = {height:.4g}, "
+            f"{_CIRCLE * radius:.3g} is allowed: a circle about another axis is wanted in "
+            "coordinates whose z is that axis"
         )
     angles = np.arctan2(scan.source[:, 0], -scan.source[:, 1])
     cone, there = _read_by(scan, angles, radius, height, 1)

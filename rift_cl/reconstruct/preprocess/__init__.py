@@ -3,7 +3,7 @@
 Stripes, zingers, beam hardening and phase; binning, a tilted axis, and half acquisitions.
 """
 
-from rift_cl.reconstruct.preprocess.alignment import straightened, tilt_halo, upright
+from rift_cl.reconstruct.preprocess.alignment import most_tilt, straightened, tilt_halo, upright
 from rift_cl.reconstruct.preprocess.binning import (
     binned,
     binned_center,
@@ -25,6 +25,7 @@ __all__ = [
     "binning_note",
     "halo_rows",
     "linearised",
+    "most_tilt",
     "paganin",
     "remove_rings",
     "remove_zingers",

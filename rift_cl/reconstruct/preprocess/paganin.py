@@ -37,6 +37,9 @@ _FAINTEST = 1e-7
 _BLOCK = 64 << 20
 # A mean above this is that of counts: propagation brightens edges, and not whole projections.
 _BRIGHTEST = 2.0
+# Photons of more, in keV, are no imaging beam's. A filter that decays over less than this share of
+# a pixel keeps more than half of the finest detail: no fringes are seen that it could retrieve.
+_HARDEST, _NARROWEST = 500.0, 0.25
 # The filter's decay is followed this many of its lengths, in which it falls by 1e-17.
 _LENGTHS = 40
 _MOST_ROWS = 1 << 22
@@ -47,7 +50,8 @@ class Propagation:
     """How projections were taken, as far as phase retrieval has to know.
 
     Args:
-        pixel: edge of a detector pixel at the object, in metres.
+        pixel: edge of a detector pixel at the object, in metres; or distance between rows and
+            between bins.
         distance: from the object to the detector, in metres.
         energy: of the photons, in keV.
         delta_beta: delta / beta of the material at this energy.
@@ -60,7 +64,7 @@ class Propagation:
         InputError: one of the numbers is missing or not positive.
     """
 
-    pixel: float
+    pixel: float | tuple[float, float]
     distance: float
     energy: float
     delta_beta: float
@@ -71,11 +75,16 @@ class Propagation:
         units = {"pixel": "metres", "distance": "metres", "energy": "keV", "delta_beta": "no unit"}
         for name, unit in units.items():
             value = getattr(self, name)
-            if not _is_positive(value):
+            if not all(map(_is_positive, self.edges if name == "pixel" else (value,))):
                 raise InputError(
                     f"phase retrieval: {name} is {value}, wanted a positive number ({unit}); it "
                     "needs pixel, distance, energy and delta_beta"
                 )
+
+    @property
+    def edges(self) -> tuple[float, float]:
+        """Distance between rows and between bins at the object, in metres."""
+        return self.pixel if isinstance(self.pixel, tuple) else (self.pixel, self.pixel)
 
     @property
     def wavelength(self) -> float:
@@ -87,9 +96,30 @@ class Propagation:
         """The distance over which the filter blurs, sqrt(z delta / mu), in metres."""
         return math.sqrt(self.distance * self.delta_beta * self.wavelength / (4 * math.pi))
 
+    def doubt(self, bins: int) -> str:
+        """What cannot be true of these numbers, as of one in another unit; empty where nothing.
+
+        Args:
+            bins: of a detector row.
+        """
+        wide = self.decay_length / self.edges[1]
+        if self.energy > _HARDEST:
+            found = f"photons of {self.energy:g} keV are no imaging beam's"
+        elif wide < _NARROWEST:
+            found = f"a filter of {wide:.2g} pixels changes next to nothing"
+        elif wide > bins:
+            found = f"a filter of {wide:.3g} pixels is wider than the detector's {bins} bins"
+        else:
+            return ""
+        return (
+            f"{found}: are {self.energy:g} keV, a distance of {self.distance:.4g} m and pixels of "
+            f"{1e6 * self.edges[1]:.4g} um what is meant (--energy, --propagation, --pitch)?"
+        )
+
     def response(self, rows: int, bins: int) -> NDArray[np.float64]:
         """What the filter multiplies the cosine transform of (rows, bins) pixels by."""
-        down, along = (self._laplacian(count) for count in (rows, bins))
+        sizes = zip((rows, bins), self.edges, strict=True)
+        down, along = (self._laplacian(count, edge) for count, edge in sizes)
         return np.asarray(1 / (1 + self.decay_length**2 * (down[:, None] + along)))
 
     def halo_rows(self, error: float = 1e-5) -> int:
@@ -105,31 +135,32 @@ class Propagation:
         """
         if not 0 < error < 1:
             raise InputError(f"error is {error}, wanted a share of the beam between 0 and 1")
-        length = self.decay_length / self.pixel
+        row_edge = self.edges[0]
+        length = self.decay_length / row_edge
         reach = 64 + math.ceil(_LENGTHS * length)
         if reach > _MOST_ROWS:
             raise InputError(
-                f"phase retrieval: the filter reaches over {length:.3g} pixels: are pixel "
-                f"({self.pixel:g}) and distance ({self.distance:g}) in metres, energy "
+                f"phase retrieval: the filter reaches over {length:.3g} rows: are pixel "
+                f"({row_edge:g}) and distance ({self.distance:g}) in metres, energy "
                 f"({self.energy:g}) in keV?"
             )
         # What rows beyond the halo contribute if they differ by the whole beam.
-        response = 1 / (1 + self.decay_length**2 * self._laplacian(reach))
+        response = 1 / (1 + self.decay_length**2 * self._laplacian(reach, row_edge))
         kernel = np.abs(np.fft.irfft(np.append(response, response[-1]), 2 * reach))[:reach]
         beyond = np.cumsum(kernel[::-1])[::-1]
         return int(np.flatnonzero(beyond < error)[0]) if beyond[-1] < error else reach
 
-    def _laplacian(self, count: int) -> NDArray[np.float64]:
-        """|k|^2 along one axis, at the frequencies of the cosine transform."""
+    def _laplacian(self, count: int, edge: float) -> NDArray[np.float64]:
+        """|k|^2 along one axis of samples so far apart, at the cosine transform's frequencies."""
         phase = np.pi * np.arange(count) / count
         squared = 2 - 2 * np.cos(phase) if self.generalised else phase**2
-        return np.asarray(squared / self.pixel**2)
+        return np.asarray(squared / edge**2)
 
 
 def paganin(
     transmission: Any,
     *,
-    pixel: float,
+    pixel: float | tuple[float, float],
     distance: float,
     energy: float,
     delta_beta: float,
@@ -141,7 +172,7 @@ def paganin(
     Args:
         transmission: I / I0 behind the object, flat and dark corrected and before any logarithm,
             (angle, row, bin); whole projections, or slabs with ``halo_rows`` more on either side.
-        pixel: edge of a detector pixel at the object, in metres.
+        pixel: as for ``Propagation``.
         distance: from the object to the detector, in metres.
         energy: of the photons, in keV.
         delta_beta: delta / beta of the material at this energy.
@@ -177,7 +208,7 @@ def paganin(
 
 def halo_rows(
     *,
-    pixel: float,
+    pixel: float | tuple[float, float],
     distance: float,
     energy: float,
     delta_beta: float,

@@ -25,7 +25,7 @@ from rift_cl.errors import InputError, NonFiniteError, ResourceLimitError
 from rift_cl.geometry.numbers import one_number
 from rift_cl.operators.linear import LinearOperator
 from rift_cl.reconstruct.solvers.residual_weight import Precondition, residual_weight
-from rift_cl.reconstruct.solvers.weighted_rays import WeightedRays, masked_data
+from rift_cl.reconstruct.solvers.weighted_rays import WeightedRays, masked_data, mean_weight
 
 # Rounds of the search for the largest eigenvalue, what is added to its answer, which comes from
 # below, and the share of it that is rounding.
@@ -70,6 +70,8 @@ class DataTerm:
         """Where arrays are kept."""
         self.samples = max(math.prod(A.range), 1)
         """Samples of y that count."""
+        self.mean_weight = 1.0
+        """Mean of the weights of the samples that count, which leaves the unit of the data open."""
         self.y = self.data()
         if weights is None:
             copy(self.device, self.given(y, A.range, name="y"), self.y)
@@ -88,6 +90,7 @@ class DataTerm:
         copy(self.device, self.given(given, self.A.range, name="y"), self.y)
         weighted.weigh(self.y)
         self.A, self.samples = weighted, weighted.measured
+        self.mean_weight = mean_weight(weighted.weights)
 
     def given(self, x: Any, shape: tuple[int, ...], *, name: str) -> Any:
         """An array that a caller gave, checked, on the side where arrays are kept.

@@ -111,7 +111,7 @@ class Fista(VariationSolver):
             self._spare,
             now.dual,
             now.image_before,
-            weight=self._weight / now.largest,
+            weight=self._strength / now.largest,
             steps=self._inner,
             nonnegative=self._nonnegative,
         )

@@ -115,7 +115,7 @@ class Pdhg(VariationSolver):
         self._constrain(image)
         # The old image becomes the point ahead, 2 new - old.
         axpby(device, 2.0, image, -1.0, now.image)
-        radius = self._weight * self.variation.cell
+        radius = self._strength * self.variation.cell
         self.variation.dual_step(now.dual, now.image, now.dual, step=self._step, radius=radius)
         now.image, image = image, now.image
         fresh = self._measure(fresh)

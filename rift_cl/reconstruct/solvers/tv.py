@@ -31,7 +31,8 @@ def tv(
     """Least squares with isotropic total variation.
 
     Minimises ``|F^(1/2) (A x - y)|^2 / 2 + weight * TV(x)``; F is the identity, or what
-    ``precondition`` names.
+    ``precondition`` names. With ``weights`` W, whose mean over the samples that count is m, it is
+    ``|F^(1/2) W^(1/2) (A x - y)|^2 / 2 + m weight * TV(x)``.
 
     Args:
         A: any linear operator from images (y, x) or volumes (z, y, x); its ``grid``, if it has one,
@@ -51,9 +52,9 @@ def tv(
             down to it, before the minimum if the weight is small, and a ramp spares frequencies in
             which there is little else.
         weights: how much each sample counts, of the shape of y: its relative inverse variance
-            (``poisson_weights``), 0 where nothing was measured; y may be anything there. ``noise``
-            and the reported residual are then those of a sample of weight 1, and
-            ``|F^(1/2) W^(1/2) (A x - y)|`` is what becomes small.
+            (``poisson_weights``), 0 where nothing was measured; y may be anything there. Their
+            scale does not matter to the image; ``noise`` and the reported residual are those of a
+            sample of weight 1.
         out: where to put the result.
 
     Returns:

@@ -6,7 +6,8 @@ The data term is a sum over the samples of y, the variation an integral over the
 ``tv_functional``), so that the weight has the unit of y squared over the unit of TV: for an image
 in u and lengths in mm, y is in u mm, TV in u mm, and the weight in u mm; for a volume TV is in
 u mm^2 and the weight in u. It does not depend on how fine the grid is, but for twice the views the
-data term is twice as large, and so is the weight that does the same.
+data term is twice as large, and so is the weight that does the same. Where rays have weights, TV
+counts times their mean, so that only their ratios matter.
 """
 
 from __future__ import annotations
@@ -63,6 +64,8 @@ class VariationSolver(Solver):
         data = DataTerm(A, y, precondition, noise, self.arrays, weights)
         super().__init__(data, noise)
         self._weight, self._nonnegative = float(weight), bool(nonnegative)
+        # What the variation counts beside data of these weights, whatever their scale.
+        self._strength = self._weight * data.mean_weight
         spacing = (1.0,) * len(A.domain) if A.grid is None else A.grid.spacing
         self.variation = TotalVariation(data.home, A.domain, spacing, direction_weights)
 
@@ -92,7 +95,7 @@ class VariationSolver(Solver):
 
     def _objective(self, image: Any, residual: Any, weighted: Any) -> float:
         square = dot(self.data.device, residual, residual if weighted is None else weighted)
-        return square / 2 + self._weight * self.variation.value(image)
+        return square / 2 + self._strength * self.variation.value(image)
 
     def _figures(self) -> dict[str, float]:
         return {"objective": self._now.objective}

@@ -21,7 +21,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from rift_cl.cl.host_arrays import check_finite, download, is_device_array
 from rift_cl.operators.linear import LinearOperator
-from rift_cl.reconstruct.solvers.weighted_rays import WeightedRays, masked_data
+from rift_cl.reconstruct.solvers.weighted_rays import WeightedRays, masked_data, mean_weight
 
 Floats = NDArray[np.float32]
 
@@ -43,7 +43,7 @@ def variation_weight(A: LinearOperator, y: Any, *, weights: ArrayLike | None = N
             directions, those of a helix in that of its angles, and as they come where ``A.scan``
             has none.
         y: the data, of shape ``A.range``, (angle, ..., bin).
-        weights: of the rays, as ``tv`` takes them; 0 where nothing was measured.
+        weights: of the rays, as ``tv`` takes them, of any scale; 0 where nothing was measured.
 
     Returns:
         The weight, in the unit of y squared over the unit of TV (see ``tv``).
@@ -52,9 +52,12 @@ def variation_weight(A: LinearOperator, y: Any, *, weights: ArrayLike | None = N
         NonFiniteError: y holds NaN or infinity where something was measured.
     """
     data = np.asarray(download(A.device, y) if is_device_array(y) else y)
-    if weights is None and isinstance(A, WeightedRays):
-        weights = A.weights
-    counted = np.broadcast_to(1 if weights is None else np.asarray(weights), data.shape)
+    if weights is not None:
+        # As the solver does, which gives the variation the data's weight.
+        counted = np.broadcast_to(np.asarray(weights), data.shape)
+        counted = counted / mean_weight(counted)
+    else:
+        counted = np.broadcast_to(A.weights if isinstance(A, WeightedRays) else 1, data.shape)
     data = masked_data(data, counted)
     check_finite(data, name="y")
     order = _views_in_order(A.scan, len(data))

@@ -8,6 +8,7 @@ compared with and the spectrum a ramp looks at mean what they mean without weigh
 
 from __future__ import annotations
 
+import math
 from functools import cached_property
 from typing import Any
 
@@ -19,6 +20,9 @@ from rift_cl.cl.elementwise import copy, multiply
 from rift_cl.cl.host_arrays import as_real_array, download, is_device_array
 from rift_cl.errors import InputError, NonFiniteError, ShapeError
 from rift_cl.operators.linear import LinearOperator
+
+# Single precision's rounding of weights whose mean is one.
+_ROUNDING = 1e-6
 
 
 class WeightedRays(LinearOperator):
@@ -107,6 +111,16 @@ def checked_weights(weights: Any, A: LinearOperator) -> NDArray[np.float64]:
     if found.min(initial=0.0) < 0:
         raise InputError(f"weights hold {found.min():g}, wanted numbers of 0 or more")
     return found
+
+
+def mean_weight(weights: NDArray[Any]) -> float:
+    """The mean weight of the samples that count, 1 where it is that but for rounding.
+
+    A prior times this number holds its own against data whose weights are of any size.
+    """
+    counted = weights[weights > 0]
+    mean = float(np.mean(counted, dtype=np.float64)) if counted.size else 1.0
+    return 1.0 if math.isclose(mean, 1, rel_tol=_ROUNDING) else mean
 
 
 def masked_data(y: Any, weights: NDArray[np.float64]) -> Any:

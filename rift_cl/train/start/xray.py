@@ -7,6 +7,8 @@ maximisation (Shepp and Vardi 1982) towards the volume, which keep its mass and 
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -30,7 +32,13 @@ Floats = NDArray[np.float64]
 
 
 def density_splats(
-    volume: Floats, grid: Grid, count: int, *, seed: int, dilation: float, size: float = 1.0
+    volume: Floats,
+    grid: Grid,
+    count: int,
+    *,
+    seed: int,
+    dilation: float | Sequence[float],
+    size: float = 1.0,
 ) -> dict[str, NDArray[np.float32]]:
     """Isotropic splats that approximate a volume.
 
@@ -39,7 +47,8 @@ def density_splats(
         grid: its samples.
         count: how many splats.
         seed: random seed.
-        dilation: variance that splats gain where they are drawn, in the grid's unit squared.
+        dilation: variance that splats gain along (x, y, z) where they are drawn, one for all or one
+            for each, in the grid's unit squared.
         size: standard deviations, as a share of the gaps between splats.
 
     Returns:
@@ -58,7 +67,7 @@ def density_splats(
     scales = np.exp(raw["log_scales"].astype(float))
     # Voxels as large as most splats tell as much of them as finer ones, and are far fewer.
     held, coarse = _coarser(held, grid, float(np.median(scales[:, 0])))
-    wider = dilation + (np.square(coarse.spacing) - np.square(grid.spacing))[::-1] / 12
+    wider = np.asarray(dilation) + (np.square(coarse.spacing) - np.square(grid.spacing))[::-1] / 12
     densities = _densities(Footprints(coarse, means, quats, scales, dilation=wider), held)
     raw["logits"] = np.log(densities).astype(np.float32)
     return raw

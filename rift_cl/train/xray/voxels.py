@@ -8,7 +8,7 @@ NumPy does it, some ten million samples a second, a few times in a fit.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -42,7 +42,7 @@ class Footprints:
         quats: Floats,
         scales: Floats,
         *,
-        dilation: float | Floats = 0.0,
+        dilation: float | Sequence[float] | Floats = 0.0,
     ) -> None:
         self.grid = grid
         self._spacing = np.array(grid.spacing[::-1])
@@ -51,7 +51,7 @@ class Footprints:
         # In steps of the grid, from its first sample on.
         self._places = (np.asarray(means, float) - first) / self._spacing
         shapes = _covariances(np.asarray(quats, float), np.asarray(scales, float))
-        wider = shapes + np.eye(3) * dilation
+        wider = shapes + np.eye(3) * np.asarray(dilation)
         self._peaks = np.sqrt(np.linalg.det(shapes) / np.linalg.det(wider))
         self._inverses = np.linalg.inv(wider) * np.multiply.outer(self._spacing, self._spacing)
         reach = _EXTENT * np.sqrt(np.diagonal(wider, axis1=1, axis2=2)) / self._spacing
