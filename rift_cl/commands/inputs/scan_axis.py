@@ -44,18 +44,18 @@ def find_axis(
 
     Args:
         scan: the scan.
-        device: accepted as by every search; this one runs on the host.
+        device: where rows of a detector that leans are turned upright; the default one if not
+            given. The search itself runs on the host.
         span: first and last bin between which to search; as for ``find_center`` if not given.
 
     Raises:
         InputError: the data do not tell the axis; the sentence names the file and says why.
         NonFiniteError: a sample is not finite.
     """
-    del device
     geometry = scan.geometry
     try:
         if scan.cone is not None:
-            return replace(_of_cone(scan, scan.cone, span), aspect=scan.aspect)
+            return replace(_of_cone(scan, scan.cone, span, device), aspect=scan.aspect)
         if isinstance(geometry, Fan):
             row = scan.shape[1] // 2
             line = read_attenuation(scan, row, row + 1).projections[:, 0]
@@ -227,7 +227,10 @@ def _moves(estimate: AxisEstimate, rows: int) -> bool:
 
 
 def _of_cone(
-    scan: ScanFile, cone: Cone | Vectors, span: tuple[float, float] | None
+    scan: ScanFile,
+    cone: Cone | Vectors,
+    span: tuple[float, float] | None,
+    device: Device | None,
 ) -> AxisEstimate:
     if not isinstance(cone, Cone) or not cone.circular:
         raise InputError(
@@ -236,7 +239,7 @@ def _of_cone(
         )
     groups = orbit_rows(cone)
     first, stop = int(groups[0][0]), int(groups[-1][-1]) + 1
-    read = _put_upright(scan, cone, first, stop)
+    read = _put_upright(scan, cone, first, stop, device)
     rows = np.stack([read[:, group - first].mean(axis=1) for group in groups], axis=1)
     places = np.array([group.mean() for group in groups])
     lying = lying_axis(_integrals_but_flats(scan, *looked_at(cone)), cone)
@@ -246,7 +249,9 @@ def _of_cone(
     return replace(found, tilt=found.tilt + slope, centers=centers)
 
 
-def _put_upright(scan: ScanFile, cone: Cone, first: int, stop: int) -> NDArray[np.float32]:
+def _put_upright(
+    scan: ScanFile, cone: Cone, first: int, stop: int, device: Device | None
+) -> NDArray[np.float32]:
     """Line integrals of some rows, turned where the file says that the axis leans.
 
     A row of a detector that leans sees the object's lower part at one end and its upper one at the
@@ -259,7 +264,7 @@ def _put_upright(scan: ScanFile, cone: Cone, first: int, stop: int) -> NDArray[n
     halo = turn.halo(cone.bins)
     start = max(0, first - halo)
     around = read_attenuation(scan, start, min(scan.shape[1], stop + halo)).projections
-    return turn.aligned(around, start, slice(first - start, stop - start), open_device())
+    return turn.aligned(around, start, slice(first - start, stop - start), device or open_device())
 
 
 def _integrals_but_flats(scan: ScanFile, views: list[int], rows: list[int]) -> NDArray[np.float32]:
