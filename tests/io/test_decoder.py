@@ -107,6 +107,12 @@ def test_paths_start_from_the_folder_that_the_process_is_in_now(monkeypatch, pic
         read_image("c.png")
 
 
+@pytest.mark.skipif(sys.platform == "win32", reason="nothing is killed by a signal on Windows")
+def test_what_a_batch_system_sends_to_all_processes_costs_no_file(fated, picture):
+    fated("os.kill(os.getpid(), signal.SIGTERM)")
+    assert read_image(picture).shape == (4, 5, 3)
+
+
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="there is no fork here")
 def test_a_forked_process_has_a_decoder_of_its_own(python, picture):
     done = python(
