@@ -127,7 +127,7 @@ class Fit(FitRun[FitPhotosSettings]):
             return {}
         height, width = max(sizes, key=lambda size: size[0] * size[1])
         factor = self.settings.downscale or factor_for(height * width, self.device)
-        small = width // factor, height // factor
+        small = max(width // factor, 1), max(height // factor, 1)
         memory = self._need(self._frame(small[0] * small[1])) / 2**20
         return {
             "photographs": f"{len(sizes)}, the largest of {width} x {height} pixels, fitted at "
