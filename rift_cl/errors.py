@@ -150,6 +150,25 @@ class OutputError(RiftError, OSError):
     exit_status = 5
 
 
+# What photographs and videos want beyond the package itself, installed from its folder.
+INSTALL = "pip install '.[capture,heic,film,view]'"
+
+
+def not_installed(what: str, package: str, alone: str, instead: str = "") -> InputError:
+    """The error where a package is missing that photographs want; all of them say it alike.
+
+    Args:
+        what: what it does, such as "a.mp4: videos are read by".
+        package: as people call it.
+        alone: its requirement, for whoever wants no other.
+        instead: what can be done without it.
+    """
+    return InputError(
+        f"{what} {package}, which is not installed: {INSTALL} in the folder of the repository, "
+        f"or pip install {alone}{instead and f'; or {instead}'}"
+    )
+
+
 def check_type(where: str, name: str, value: object, wanted: type) -> None:
     """Refuse an argument of another type by name, before something looks for its parts.
 

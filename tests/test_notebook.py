@@ -172,7 +172,7 @@ def test_a_function_shows_a_bar_if_it_is_asked_to(notebook, tmp_path, device):
 def test_a_page_needs_viser_and_says_how_to_get_it(tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, "viser", None)
     scene().save(tmp_path / "scene.ply")
-    with pytest.raises(InputError, match=r"pip install 'viser>=1\.1,<1\.2'"):
+    with pytest.raises(InputError, match=r"film,view\]' .*or pip install 'viser>=1\.1,<1\.2'"):
         rift.view(tmp_path / "scene.ply")
 
 

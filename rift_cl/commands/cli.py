@@ -262,14 +262,14 @@ def _wrapped(line: str) -> list[str]:
 
 
 def _demo(settings: Any, output: Output) -> None:
-    from rift_cl.commands.demo.job import COLUMNS, SCORING, DemoJob
+    from rift_cl.commands.demo.job import COLUMNS, SCORING, DemoJob, what_to_see
     from rift_cl.commands.fit_photos.report import COLUMNS as FIT_COLUMNS
     from rift_cl.commands.fit_photos.report import SCORING as FIT_SCORING
     from rift_cl.commands.fit_photos.report import score_rows
 
     job = DemoJob(settings)
     run_job(job, output)
-    print_table(COLUMNS, job.rows, caption=SCORING)
+    print_table(COLUMNS, job.rows, caption=f"{SCORING} {what_to_see(job.rows)}")
     for name, fit in job.fits.items():
         print_table(FIT_COLUMNS, score_rows(fit.metrics), caption=f"{name}: {FIT_SCORING}")
     print(f"pictures and report.html are in {settings.out}")

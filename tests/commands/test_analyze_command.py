@@ -245,6 +245,27 @@ def test_what_is_no_capture_and_no_scan_is_named(scan, tmp_path, capsys):
     assert not (tmp_path / "out").exists()
 
 
+@pytest.mark.parametrize("name", ["a.png", "images/a.jpg", "walk.mp4"])
+def test_photographs_without_cameras_are_sent_to_a_fit(tmp_path, capsys, name):
+    source = tmp_path / "holiday"
+    (source / name).parent.mkdir(parents=True)
+    (source / name).write_bytes(b"a header is not looked at")
+    source = source / name if name == "walk.mp4" else source
+    for mode in ("volume", "surface"):
+        assert analyze(source, tmp_path / "out", "--mode", mode) == 3
+        said = capsys.readouterr().err
+        assert "without cameras: run 'rift fit' first, then 'rift analyze FIT'" in said
+
+
+def test_a_folder_of_tiff_is_taken_for_a_scan_as_before(tmp_path, capsys):
+    (tmp_path / "scan/raw").mkdir(parents=True)
+    for name in ("scan/preview.png", "scan/raw/a.tif"):
+        (tmp_path / name).write_bytes(b"damaged")
+    assert analyze(tmp_path / "scan", tmp_path / "out") == 3
+    said = capsys.readouterr().err
+    assert "without cameras" not in said and "a.tif" in said
+
+
 def test_of_a_narrow_wedge_the_detail_within_it_is_said_and_the_share_outside(scan):
     sampled = open_sampled(AnalyzeSettings(scan.integrals, theta="0:30"))
     found = resolution(sampled, ("middle", "b", "c"))

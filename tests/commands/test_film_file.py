@@ -137,8 +137,26 @@ def test_the_kind_of_a_film_by_what_there_is(monkeypatch):
     monkeypatch.setitem(sys.modules, "av", None)
     monkeypatch.setattr("rift_cl.io.images.film_file.find_spec", lambda _: None)
     assert chosen_film("auto", alike) == "apng"
-    with pytest.raises(InputError, match=r"pip install av .*--film"):
+    with pytest.raises(InputError, match=r"film,view\]' in the .*or pip install av; .*--film"):
         chosen_film("mp4", alike)
+
+
+def test_a_film_that_becomes_a_png_says_what_would_make_it_smaller(tmp_path, monkeypatch, capsys):
+    SplatScene(
+        means=np.zeros((1, 3)),
+        log_scales=np.full((1, 3), -1.0),
+        quats=np.tile([1.0, 0, 0, 0], (1, 1)),
+        logit_opacities=np.full(1, 2.0),
+        sh=np.ones((1, 1, 3)),
+    ).save(tmp_path / "scene.ply")
+    words = ["--frames", "2", "--size", "24", "16", "--overwrite", "--out", str(tmp_path / "film")]
+    told = "pip install '.[capture,heic,film,view]'"
+    monkeypatch.setattr("rift_cl.io.images.film_file.find_spec", lambda _: None)
+    assert main(["render", str(tmp_path / "scene.ply"), *words]) == 0
+    assert told in "".join(capsys.readouterr())
+    # Of a film that is asked for there is nothing to say.
+    assert main(["render", str(tmp_path / "scene.ply"), *words, "--film", "apng"]) == 0
+    assert told not in "".join(capsys.readouterr())
 
 
 def test_a_rendering_leaves_a_film_of_its_frames_and_a_small_copy_in_the_report(

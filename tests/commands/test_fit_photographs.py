@@ -84,6 +84,18 @@ def test_what_is_odd_in_a_folder_is_said_in_two_lines(photographs, tmp_path, pos
     assert len(said) == 4
 
 
+def test_a_dry_run_counts_photographs_without_poses(photographs, tmp_path, posed, capsys):
+    Image.fromarray(np.zeros((30, 64, 3), np.uint8)).save(photographs / "wide.png")
+    (photographs / "odd.png").write_bytes(b"odd")
+    words = ("fit", str(photographs), "--out", str(tmp_path / "fit"), "--dry-run", "--downscale")
+    for factor, size in (("1", "64 x 30"), ("4", "16 x 7")):
+        assert main([*words, factor, *SHORT]) == 0
+        said = " ".join(capsys.readouterr().out.split())
+        assert f"5, the largest of 64 x 30 pixels, fitted at {size}" in said
+        assert "MiB, and the tile lists" in said
+    assert not (tmp_path / "fit").exists()
+
+
 def test_a_video_is_fitted_by_its_frames(tmp_path, posed, capsys):
     tags = {"color_trc": 18, "color_primaries": 9, "colorspace": 9}
     video = store_video(tmp_path / "walk.mp4", frames(12), **tags)

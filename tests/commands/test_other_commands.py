@@ -13,6 +13,7 @@ import pytest
 
 import rift_cl as rift
 from rift_cl.commands.cli import COMMANDS, main
+from rift_cl.commands.demo.job import what_to_see
 
 # No fit: tests that look at other things should not wait for one.
 NO_FIT = ("--steps", "0")
@@ -33,7 +34,17 @@ def test_demo(tmp_path, capsys):
         p.name for p in out.iterdir()
     }
     assert not (out / "ornament").exists()
-    assert "PSNR filtered" in capsys.readouterr().out
+    said = " ".join(capsys.readouterr().out.split())
+    assert "PSNR filtered" in said
+    assert f"with 150 views the filtered slice has {filtered[-1]:.1f} dB" in said
+
+
+def test_what_the_table_of_the_demo_shows_is_said():
+    many = (512, 14.68, 0.45, 33.69, 0.9)
+    better = "with 512 views the filtered slice has 33.7 dB, the unfiltered one 14.7."
+    assert what_to_see([(95, 14.68, 0.45, 28.5, 0.74), many]).endswith(better)
+    worse = what_to_see([(2, 13.9, 0.4, 2.0, 0.1), (12, 14.6, 0.4, 11.2, 0.3), many])
+    assert better in worse and "With 12 views and fewer, streaks cost" in worse
 
 
 @pytest.mark.full

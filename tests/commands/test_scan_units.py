@@ -125,6 +125,18 @@ def test_a_unit_without_a_length_is_refused(
     assert settings_of(tmp_path / "out")["unit"] == "um"
 
 
+def test_a_pitch_without_a_unit_is_said_to_have_none(
+    bare: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    named = ("--pitch", 6.5, "--unit", "um")
+    rows = [(("--pitch", 6.5), True), (named, False), (("--pitch", 1), False)]
+    for number, (options, told) in enumerate(rows):
+        assert run(bare, tmp_path / str(number), *options) == 0
+        printed = " ".join("".join(capsys.readouterr()).split())
+        assert ("in a unit without a name: --unit" in printed) == told
+    assert settings_of(tmp_path / "0")["unit"] == ""
+
+
 @pytest.mark.parametrize("rows", [1, 3])
 def test_a_fan_and_a_cone_are_converted_whole(tmp_path: Path, rows: int) -> None:
     lengths = {"source_to_axis": 60.0, "source_to_detector": 120.0, "pitch": 2.0}

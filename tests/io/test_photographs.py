@@ -210,7 +210,7 @@ def test_what_is_missing_is_said_before_anything_is_written(
         check_photographs(tmp_path / "two")
     made.photographs(folder, NAMES)
     monkeypatch.setattr("importlib.util.find_spec", lambda name: None)
-    with pytest.raises(InputError, match=r"pip install pycolmap"):
+    with pytest.raises(InputError, match=r"film,view\]' in the .*or pip install pycolmap"):
         run(pose_photographs(folder, tmp_path / "fit" / "poses"))
     with pytest.raises(InputError, match="no such file"):
         run(pose_photographs(tmp_path / "gone", tmp_path / "fit" / "poses"))

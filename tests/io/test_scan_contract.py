@@ -134,8 +134,8 @@ def test_the_line_says_everything(tmp_path: Path) -> None:
         file["measurement/instrument/detector/actual_pixel_size_x"].attrs["units"] = "um"
     scan = open_scan(path)
     assert scan.notes == (
-        "a.h5: counts (uint16, 1105 to 3000), 1 flat and no darks; axes (angle, row, bin) "
-        "40 x 3 x 32; angles in degrees over 175.5; pitch 0.65 um.",
+        "a.h5: counts (uint16, 1105 to 3000 in the frames looked at), 1 flat and no darks; axes "
+        "(angle, row, bin) 40 x 3 x 32; angles in degrees over 175.5; pitch 0.65 um.",
     )
 
 

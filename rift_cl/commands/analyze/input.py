@@ -21,8 +21,17 @@ from rift_cl.geometry import Camera, Cone, Parallel, Scan, Vectors
 from rift_cl.geometry.aperture import Aperture
 from rift_cl.geometry.scan_cameras import scan_cameras
 from rift_cl.geometry.seen_grid import scan_lengths, seen_grid
-from rift_cl.io.captures.capture import Capture, capture_name, holds_capture, open_capture
+from rift_cl.io.captures.capture import (
+    Capture,
+    capture_name,
+    holds_bare_photographs,
+    holds_capture,
+    open_capture,
+)
+from rift_cl.io.captures.photograph_folder import photographs_in
+from rift_cl.io.captures.video import holds_video
 from rift_cl.io.scans.scan_file import ScanFile
+from rift_cl.io.scans.tiff_folder import grouped_names
 from rift_cl.reconstruct.direct.offset_axis import sees_further
 from rift_cl.sampling.targets.target import Target
 
@@ -53,7 +62,23 @@ def open_views(settings: AnalyzeSettings) -> tuple[ViewSet, AnalyzeSettings]:
         RiftError: the file cannot be read, or an option does not belong to it.
     """
     path = settings.source
-    return _capture(settings) if holds_capture(path) else _scan(settings)
+    if holds_capture(path):
+        return _capture(settings)
+    try:
+        return _scan(settings)
+    except InputError as error:
+        if not _bare(path):
+            raise
+        raise InputError(
+            f"{path}: photographs without cameras: run 'rift fit' first, then 'rift analyze FIT'"
+        ) from error
+
+
+def _bare(path: Path) -> bool:
+    """Whether a path is a video, or a folder of photographs that can be no projections."""
+    if holds_video(path):
+        return True
+    return holds_bare_photographs(path) and not grouped_names(photographs_in(path).path)
 
 
 def _capture(settings: AnalyzeSettings) -> tuple[ViewSet, AnalyzeSettings]:

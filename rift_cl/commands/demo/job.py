@@ -132,7 +132,7 @@ def _show_study(page: Page, scores: list[ViewScore], rows: list[tuple[float, ...
         "Below: the ramp filter takes the bias away.",
         alt="Reconstructions for growing numbers of views, unfiltered above, filtered below",
     )
-    page.table(COLUMNS, rows, caption=SCORING)
+    page.table(COLUMNS, rows, caption=f"{SCORING} {what_to_see(rows)}")
     views = [s.views for s in scores]
     for metric, label in (("psnr", "PSNR, dB"), ("ssim", "SSIM")):
         draw = partial(study_curves, views, [s.scores for s in scores], metric, label)
@@ -163,6 +163,19 @@ def _show_film(page: Page, film: Render) -> None:
 def study_row(score: ViewScore) -> tuple[float, ...]:
     """A row of the table of scores."""
     return (score.views, *(score.scores[key] for key in SCORES))
+
+
+def what_to_see(rows: Sequence[tuple[float, ...]]) -> str:
+    """What the table of scores shows, a sentence; rows as ``study_row`` makes them."""
+    views, unfiltered, _, filtered, _ = max(rows)
+    told = (
+        f"More dB are better: with {views:g} views the filtered slice has {filtered:.1f} dB, the "
+        f"unfiltered one {unfiltered:.1f}."
+    )
+    worse = [row[0] for row in rows if row[3] < row[1]]
+    if filtered <= unfiltered or not worse:
+        return told
+    return f"{told} With {max(worse):g} views and fewer, streaks cost the filtered slice more."
 
 
 def study_panels(scores: list[ViewScore], size: float = 2.4) -> Any:

@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 
 from rift_cl.commands.view.browser_splats import AWAY, browser_splats
 from rift_cl.commands.view.guard import Guard
-from rift_cl.errors import InputError
+from rift_cl.errors import InputError, not_installed
 from rift_cl.geometry import Camera
 from rift_cl.io.scenes.splat_scene import SplatScene
 
@@ -121,9 +121,7 @@ def _server() -> Any:
     try:
         viser = importlib.import_module("viser")
     except ImportError as error:
-        raise InputError(
-            "a page wants viser, which is not installed: pip install 'viser>=1.1,<1.2'"
-        ) from error
+        raise not_installed("a page is made by", "viser", "'viser>=1.1,<1.2'") from error
     guard = Guard()
     with contextlib.redirect_stdout(io.StringIO()), guard.before_viser():
         return viser.ViserServer(host="127.0.0.1", port=0, verbose=False)

@@ -13,8 +13,10 @@ from rift_cl.io.captures.capture import Capture, holds_bare_photographs, open_ca
 from rift_cl.io.captures.colmap_process import check_pycolmap
 from rift_cl.io.captures.photograph_folder import (
     other_files,
+    photograph_names,
     photographs_in,
     unread_photographs,
+    with_headers,
 )
 from rift_cl.io.captures.photographs import check_photographs, pose_photographs
 from rift_cl.io.captures.video import check_video, holds_video, sharpest_frames, video_notes
@@ -62,6 +64,18 @@ class BareInput:
         """What it is, for people."""
         what = f"a video: {self._frames} sharp frames and" if self._video else "bare photographs:"
         return f"{self.source}, {what} their poses are found first"
+
+    def sizes(self) -> list[tuple[int, int]]:
+        """(height, width) of the photographs whose headers can be read; none of a video's frames.
+
+        Raises:
+            PathEscapeError: a photograph is a link that leads out of the folder.
+        """
+        if self._video:
+            return []
+        place = photographs_in(self.folder)
+        found = with_headers(place, photograph_names(place), {})
+        return [one.header.shown_size for one in found]
 
     def find(self) -> Generator[Report, None, Capture]:
         """Find the poses.

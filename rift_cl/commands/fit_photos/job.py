@@ -16,6 +16,7 @@ from rift_cl.commands.fit_photos.bare_input import BareInput
 from rift_cl.commands.fit_photos.comparison import compared_record, comparison_notes
 from rift_cl.commands.fit_photos.photograph_size import (
     check_window,
+    factor_for,
     fitting_downscale,
     size_words,
 )
@@ -106,6 +107,7 @@ class Fit(FitRun[FitPhotosSettings]):
                 "capture": self.source.words,
                 "splats": self._splats,
                 "device": self.device.name,
+                **self._known_without_poses(self.source),
             }
         cameras = [camera_at(view, self.downscale) for view in self.training_views]
         largest = max(camera.height * camera.width for camera in cameras)
@@ -120,6 +122,22 @@ class Fit(FitRun[FitPhotosSettings]):
             "splats": self._splats,
             "device": self.device.name,
             **self._tried(self.source, largest),
+        }
+
+    def _known_without_poses(self, source: BareInput) -> dict[str, str]:
+        """How many photographs there are, their size and the memory that it takes."""
+        sizes = source.sizes()
+        if not sizes:
+            return {}
+        height, width = max(sizes, key=lambda size: size[0] * size[1])
+        factor = self.settings.downscale or factor_for(height * width, self.device)
+        small = max(width // factor, 1), max(height // factor, 1)
+        memory = self._need(self._frame(small[0] * small[1])) / 2**20
+        return {
+            "photographs": f"{len(sizes)}, the largest of {width} x {height} pixels, fitted at "
+            f"{small[0]} x {small[1]}",
+            "device memory": f"{memory:.0f} MiB, and the tile lists",
+            "time": "is known once the poses are, which COLMAP finds first",
         }
 
     def _tried(self, capture: Capture, pixels: int) -> dict[str, str]:

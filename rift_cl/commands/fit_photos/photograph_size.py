@@ -28,8 +28,12 @@ def fitting_downscale(views: Sequence[View], device: Device) -> int:
         views: the photographs, one or more.
         device: what fits them.
     """
-    largest = max(view.camera.height * view.camera.width for view in views)
-    return max(1, math.ceil(math.sqrt(largest / MOST_PIXELS[device.traits.is_cpu])))
+    return factor_for(max(view.camera.height * view.camera.width for view in views), device)
+
+
+def factor_for(pixels: int, device: Device) -> int:
+    """The same for the pixels of the largest photograph."""
+    return max(1, math.ceil(math.sqrt(pixels / MOST_PIXELS[device.traits.is_cpu])))
 
 
 def check_window(views: Sequence[View], factor: int) -> None:

@@ -39,7 +39,14 @@ def with_lengths(scan: ScanFile, pitch: float | None, unit: str | None) -> ScanF
                 f"--pitch {pitch:g} has no unit, and lengths in {scan.path} are in {scan.unit}: "
                 f"say which it is with --unit, such as --unit {scan.unit}"
             )
-        return scan
+        # A pitch of 1 counts in bins, which is a unit with a name.
+        if pitch in (None, 1.0) or scan.unit:
+            return scan
+        note = (
+            "Lengths, and values per length, are in a unit without a name: --unit says which that "
+            f"of --pitch {pitch:g} is."
+        )
+        return dataclasses.replace(scan, notes=(*scan.notes, note))
     own, wanted = length_unit(scan.unit), length_unit(unit)
     if wanted is None and unit not in ("", BIN, scan.unit):
         raise InputError(f"--unit is {unit!r}, wanted a unit of length: {known_units()}")

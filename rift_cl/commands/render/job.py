@@ -32,11 +32,11 @@ from rift_cl.commands.render.animation import chosen_film, shrunk
 from rift_cl.commands.render.report import Sheet, render_page, write_bytes
 from rift_cl.commands.render.settings import LIMITS, MOST_FRAMES, RenderSettings
 from rift_cl.commands.run_folder.run_folder import RunFolder
-from rift_cl.errors import InputError
+from rift_cl.errors import INSTALL, InputError
 from rift_cl.geometry import Camera
 from rift_cl.io.captures.capture import Capture, View, open_capture
 from rift_cl.io.captures.transforms_record import transforms_of
-from rift_cl.io.images.film_file import film_writer, suffix_of
+from rift_cl.io.images.film_file import film_writer, films_can_be_written, suffix_of
 from rift_cl.io.images.image import read_image, write_png
 from rift_cl.io.images.pixels import write_pixels
 from rift_cl.io.output import atomic_path, make_folder, write_json
@@ -90,7 +90,14 @@ class Render:
     def notes(self) -> tuple[str, ...]:
         """Assumptions, a sentence each."""
         named = self.settings.path is not None
-        return self._lens_notes if named else self.settings.notes(self.scene)
+        notes = self._lens_notes if named else self.settings.notes(self.scene)
+        if self.settings.film != "auto" or self._kind != "apng" or films_can_be_written():
+            return notes
+        return (
+            *notes,
+            "The film is an animated PNG, for PyAV is not installed, with which it would be a "
+            f"smaller WebM: {INSTALL} in the folder of the repository, or pip install av.",
+        )
 
     @property
     def decided(self) -> RenderSettings:

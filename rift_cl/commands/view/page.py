@@ -29,7 +29,7 @@ from rift_cl.commands.view.standpoint import Standpoint
 from rift_cl.commands.view.view_panel import ViewPanel
 from rift_cl.commands.view.viser_camera import pose_of
 from rift_cl.commands.view.wish import KINDS, Kind, Wish
-from rift_cl.errors import InputError
+from rift_cl.errors import InputError, not_installed
 
 _HOST = "127.0.0.1"
 # How near and far what the browser draws may be, in distances of the first view.
@@ -210,9 +210,8 @@ def _viser() -> Any:
     try:
         return importlib.import_module("viser")
     except ImportError as error:
-        raise InputError(
-            f"showing splats in a browser needs viser ({error}): pip install 'viser>=1.1,<1.2'"
-        ) from error
+        what = "splats are shown in a browser by"
+        raise not_installed(what, "viser", "'viser>=1.1,<1.2'") from error
 
 
 def _check_port(port: int) -> None:

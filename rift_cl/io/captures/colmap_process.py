@@ -10,12 +10,10 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
-from rift_cl.errors import InputError
+from rift_cl.errors import InputError, not_installed
 from rift_cl.io.json_fields import read_json_object
 from rift_cl.io.output import write_json, writing
 from rift_cl.progress import Report
-
-INSTALL = "pip install pycolmap"
 
 # Modules come from where they come from here, not from the folder that we happen to be in.
 _CODE = (
@@ -36,9 +34,7 @@ def check_pycolmap() -> None:
         InputError: it is not.
     """
     if importlib.util.find_spec("pycolmap") is None:
-        raise InputError(
-            f"poses of bare photographs are found by pycolmap, which is not installed; {INSTALL}"
-        )
+        raise not_installed("poses of bare photographs are found by", "pycolmap", "pycolmap")
 
 
 def run_colmap(job: Mapping[str, Any], log: Path) -> Iterator[Report]:

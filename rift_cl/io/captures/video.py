@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rift_cl.errors import InputError, RiftError
+from rift_cl.errors import InputError, RiftError, not_installed
 from rift_cl.io.decoder import Decoder
 from rift_cl.io.images.pixels import write_pixels
 from rift_cl.io.json_fields import read_json_object
@@ -66,10 +66,8 @@ def video_notes(path: Path) -> list[str]:
 
 def _check_installed(path: Path) -> None:
     if find_spec("av") is None:
-        raise InputError(
-            f"{path}: videos are read by PyAV, which is not installed: pip install av (or "
-            "'.[film]' where the source is), or give a folder of its frames"
-        )
+        what = f"{path}: videos are read by"
+        raise not_installed(what, "PyAV", "av", "give a folder of its frames")
 
 
 def sharpest_frames(

@@ -21,7 +21,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from rift_cl.errors import InputError, OutputError
+from rift_cl.errors import InputError, OutputError, not_installed
 from rift_cl.io.output import atomic_path
 
 FilmKind = Literal["webm", "mp4", "mp4-h264"]
@@ -68,10 +68,7 @@ def check_films(kind: FilmKind) -> None:
         InputError: PyAV is not installed, or comes without the encoder.
     """
     if not films_can_be_written():
-        raise InputError(
-            f"--film {kind} is written by PyAV, which is not installed: pip install av (or "
-            "'.[film]' where the source is), or say --film apng"
-        )
+        raise not_installed(f"--film {kind} is written by", "PyAV", "av", "say --film apng")
     import av
 
     codec = _ENCODERS[kind].codec

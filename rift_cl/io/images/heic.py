@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rift_cl.errors import FileFormatError, InputError
+from rift_cl.errors import FileFormatError, not_installed
 
 # EXIF's numbers of the maker, the model, its own folder of facts, and the focal lengths in there.
 _MAKE, _MODEL, _EXIF, _FOCALS = 271, 272, 0x8769, (0x920A, 0xA405)
@@ -42,10 +42,8 @@ def check_heic(path: Path) -> None:
         InputError: it is not.
     """
     if find_spec("pi_heif") is None:
-        raise InputError(
-            f"{path}: HEIC photographs are read by pi-heif, which is not installed: pip install "
-            "pi-heif (or '.[heic]' where the source is), or save them as JPEG"
-        )
+        what = f"{path}: HEIC photographs are read by"
+        raise not_installed(what, "pi-heif", "pi-heif", "save them as JPEG")
 
 
 def opened_heic(path: Path) -> Any:

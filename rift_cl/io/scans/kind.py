@@ -76,7 +76,7 @@ class Sample:
     zeros: float
 
     def __str__(self) -> str:
-        return f"{self.dtype.name}, {self.low:.4g} to {self.high:.4g}"
+        return f"{self.dtype.name}, {self.low:.4g} to {self.high:.4g} in the frames looked at"
 
 
 def sample(rows: RowSource, shape: tuple[int, int, int], dtype: np.dtype[np.generic]) -> Sample:
