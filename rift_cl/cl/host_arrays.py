@@ -278,9 +278,12 @@ def as_device_array(
 def _check_whole(device: Device, array: DeviceArray, *, name: str, inside: bool = False) -> None:
     """Kernels and copies see buffers, and know nothing of views into them."""
     # A copy of an output would be written in its place.
-    remedy = "give an array of its own" if name == "out" else f"pass {name}.copy()"
+    own = "give an array of its own"
     if not array.flags.c_contiguous:
+        # pyopencl copies no such view.
+        remedy = own if name == "out" else "upload that part of the host's array by itself"
         raise ShapeError(f"{name} is a strided view on the device: {remedy}")
+    remedy = own if name == "out" else f"pass {name}.copy()"
     if array.offset and not inside:
         raise ShapeError(f"{name} is a view that begins inside another device array: {remedy}")
     if array.context != device.context:

@@ -202,6 +202,23 @@ def test_center(scan, tmp_path, capsys):
     assert by == "double wedge and centre of mass"
 
 
+@pytest.mark.parametrize(("span", "shown"), [((), (20.4, 26.6)), (("18", "22"), (18, 22))])
+def test_an_axis_that_is_not_found_is_left_to_the_eye(span, shown, tmp_path, capsys):
+    noise = np.random.default_rng(0).normal(1, 0.01, (40, 3, 48)).astype(np.float32)
+    np.savez(tmp_path / "noise.npz", projections=noise, angles=np.arange(40) * np.pi / 40)
+    out = tmp_path / "center"
+    words = ["--kind", "attenuation", *(("--span", *span) if span else ()), "--out", str(out)]
+    assert main(["center", str(tmp_path / "noise.npz"), *words]) == 3
+    said = capsys.readouterr()
+    assert said.out == "" and "report.html shows slices" in " ".join(said.err.split())
+    page = (out / "report.html").read_text()
+    assert page.count("data:image/jpeg;base64,") == 17 + 9
+    metrics = json.loads((out / "metrics.json").read_text())
+    assert metrics["center"] is None and len(metrics["shown"]) == 17
+    assert (metrics["shown"][0], metrics["shown"][-1]) == pytest.approx(shown, abs=3)
+    assert metrics["shown"][0] < metrics["shown"][-1]
+
+
 def test_center_of_a_row_that_is_not_there(scan, tmp_path, capsys):
     assert main(["center", str(scan.counts), "--row", "7", "--out", str(tmp_path / "c")]) == 3
     assert "--row is 7" in capsys.readouterr().err

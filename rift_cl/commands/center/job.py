@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from functools import partial
 from typing import Any
@@ -21,12 +21,15 @@ from rift_cl.operators import Projector
 from rift_cl.progress import Report
 from rift_cl.reconstruct import AxisEstimate, fbp
 from rift_cl.reconstruct.axis.fan_rays import parallel_views
+from rift_cl.reconstruct.axis.search import GIVE_IT
 from rift_cl.report.html_page import Page
 from rift_cl.report.plot import curves, figure_svgs, framed
 
 # Centres of the slider in bins from the best one, and those of the contact sheet among them.
 _SLIDER = (-8.0, -6, -4, -3, -2, -1.5, -1, -0.5, 0, 0.5, 1, 1.5, 2, 3, 4, 6, 8)
 _SHEET = (-8.0, -4, -2, -1, 0, 1, 2, 4, 8)
+# Where nothing is found, the slider reaches this part of the detector to either side.
+_AROUND = 8
 # Percentiles of the best slice that are shown black and white, in percent.
 _WINDOW = (0.5, 99.5)
 
@@ -73,25 +76,56 @@ class CenterJob:
         }
 
     def run(self) -> Iterator[Report]:
-        """Run the search, then reconstruct a slice for each axis position of the slider."""
+        """Run the search, then reconstruct a slice for each axis position of the slider.
+
+        Raises:
+            InputError: the data do not tell the axis; the report has slices to judge by eye.
+        """
         total = 1 + len(_SLIDER)
         yield Report(0, total, "steps")
-        found = find_axis(self.scan, self.device, span=self.settings.span)
+        sinogram = read_attenuation(self.scan, self.row, self.row + 1).projections[:, 0]
+        try:
+            found = find_axis(self.scan, self.device, span=self.settings.span)
+        except InputError as error:
+            why = str(error).removesuffix(GIVE_IT)
+            yield from self._left_to_the_eye(sinogram, why)
+            first, *_, last = self.metrics["shown"]
+            raise InputError(
+                f"{why}; {self.folder.path / 'report.html'} shows slices with the axis at bins "
+                f"{first:.4g} to {last:.4g}: give that of the one without doubled edges "
+                "(--center), or look between others (--span A B --overwrite)"
+            ) from error
         tilt = tilt_worth_turning(found, self.scan.shape[1])
         told = {"tilt_degrees": tilt} if tilt else {}
         self.metrics = {**found.record(), **told, "row": self.row}
         here = found.center + found.tilt * (self.row - self._middle)
         turned = found.sense is not None and found.sense.sign < 0
-        sinogram = read_attenuation(self.scan, self.row, self.row + 1).projections[:, 0]
         slices = {}
         for step, offset in enumerate(_SLIDER, start=1):
             yield Report(step, total, "steps", {"center": found.center})
-            slices[offset] = self._slice(sinogram, here + offset, turned=turned)
+            slices[here + offset] = self._slice(sinogram, here + offset, turned=turned)
+        self._finish(self._page(found, here, slices))
+        yield Report(total, total, "steps", {"center": found.center})
+
+    def _left_to_the_eye(self, sinogram: NDArray[np.float32], why: str) -> Iterator[Report]:
+        """A report of slices over the span of the search, or else about the detector's middle."""
+        bins = self.scan.shape[2]
+        middle, reach = (bins - 1) / 2, bins / _AROUND
+        first, last = self.settings.span or (middle - reach, middle + reach)
+        slices = {}
+        for step, center in enumerate(np.linspace(first, last, len(_SLIDER)).tolist(), start=1):
+            yield Report(step, 1 + len(_SLIDER), "steps")
+            slices[center] = self._slice(sinogram, center, turned=False)
+        self.metrics = {"center": None, "why": why, "shown": list(slices), "row": self.row}
+        page = Page(f"Rotation axis of {self.scan.path.name}", "not found; to be chosen by eye")
+        page.paragraph(f"{why}.")
+        self._show(page, slices, len(_SLIDER) // 2, list(slices)[::2])
+        self._finish(page)
+
+    def _finish(self, page: Page) -> None:
         self.folder.make()
-        page = self._page(found, here, slices)
         decided = replace(absolute_paths(self.settings), kind=self.scan.kind, row=self.row)
         self.folder.finish(decided, self.metrics, page, self.device, asked=self.settings)
-        yield Report(total, total, "steps", {"center": found.center})
 
     def _slice(
         self, sinogram: NDArray[np.float32], center: float, *, turned: bool
@@ -111,30 +145,43 @@ class CenterJob:
         A = Projector(Grid((bins, bins)), geometry, device=self.device)
         return _middle(np.asarray(fbp(A, sinogram)))
 
-    def _page(
-        self, found: AxisEstimate, here: float, slices: dict[float, NDArray[np.float32]]
-    ) -> Page:
-        page = Page(f"Rotation axis of {self.scan.path.name}", found.in_words())
-        black, white = (float(level) for level in np.percentile(slices[0.0], _WINDOW))
+    def _show(
+        self,
+        page: Page,
+        slices: dict[float, NDArray[np.float32]],
+        start: int,
+        sheet: Sequence[float],
+    ) -> None:
+        """A slider over slices by their axis, beginning at one of them, and some side by side."""
+        black, white = (
+            float(level) for level in np.percentile(list(slices.values())[start], _WINDOW)
+        )
         white = white if white > black else black + 1
         files, _ = framed(list(slices.values()), window=(black, white))
         page.slider(
             files,
-            labels=[f"bin {here + offset:.2f}" for offset in slices],
-            start=_SLIDER.index(0.0),
+            labels=[f"bin {center:.2f}" for center in slices],
+            start=start,
             caption=f"Centre of the slice at row {self.row} for the chosen axis; a wrong one shows "
             "arcs and doubled edges.",
             alt="Slice with the centre at",
         )
-        page.facts(_facts(found))
-        by_offset = dict(zip(slices, files, strict=True))
+        by_center = dict(zip(slices, files, strict=True))
         page.panels(
-            [by_offset[offset] for offset in _SHEET],
-            titles=[f"{here + offset:.2f}" for offset in _SHEET],
+            [by_center[center] for center in sheet],
+            titles=[f"{center:.2f}" for center in sheet],
             columns=3,
-            caption="The same slices side by side; the best one is in the middle.",
+            caption="The same slices side by side.",
             alt="Slice with the centre at",
         )
+
+    def _page(
+        self, found: AxisEstimate, here: float, slices: dict[float, NDArray[np.float32]]
+    ) -> Page:
+        page = Page(f"Rotation axis of {self.scan.path.name}", found.in_words())
+        sheet = [here + offset for offset in _SHEET]
+        self._show(page, slices, _SLIDER.index(0.0), sheet)
+        page.facts(_facts(found))
         draw = partial(
             curves,
             {"all rows": (found.scores[0], found.scores[1])},

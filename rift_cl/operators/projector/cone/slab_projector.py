@@ -60,6 +60,11 @@ class SlabProjector(VolumeInParts):
 
     The domain is ``grid.shape``; the range is (views, rows, bins).
 
+    Between rows all of them go through Keys' cubic (kernels/include/cone/slab_table.h), whose
+    weights are negative in part: the projection of ones is a few hundredths of its largest value
+    below 0 in rows at the edge of the shadow. Methods that divide by it (SIRT, MLEM) leave out
+    rays where it is small, as ``rift.sirt`` does.
+
     Raises:
         InputError: the grid is no volume, the footprint or the type is unknown, the source stands
             in the volume, the fan is wider than some 90 degrees, or bins and samples are of very
