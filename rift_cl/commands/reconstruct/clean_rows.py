@@ -157,7 +157,7 @@ class CleanRows:
             notes.append(
                 "Zingers, single pixels that stand out from their neighbours by "
                 f"{self._settings.zingers:g} standard deviations, are looked for and replaced; "
-                "'zingers' is how many."
+                "of a whole run 'zingers' is how many."
             )
         if self._settings.hardening is not None:
             terms = " + ".join(
