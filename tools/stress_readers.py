@@ -87,6 +87,10 @@ def damaged_files(options: Options) -> Iterator[tuple[int, str, bytes]]:
     """Number, kind and content of every file."""
     intact = {name: kind.make() for name, kind in KINDS.items()}
     names = [name for name in KINDS if options.only in name]
+    if not names:
+        raise SystemExit(
+            f"stress_readers: --only is {options.only!r}, known are {', '.join(KINDS)}"
+        )
     for index in range(options.first, options.first + options.files):
         random = np.random.default_rng([options.seed, index])
         name = names[index % len(names)]
