@@ -201,6 +201,7 @@ def test_an_imagej_stack_that_hides_its_images(tmp_path: Path) -> None:
         open_scan(tmp_path / "a.tif")
 
 
+@pytest.mark.skipif(OpenImageIO.VERSION < 30200, reason="older versions give no reason")
 def test_a_compression_that_is_not_read_is_named(tmp_path: Path) -> None:
     """A whole file by its header's word for ZSTD, which the decoder is built without."""
     path = tmp_path / "a.tif"
