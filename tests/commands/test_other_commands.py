@@ -219,6 +219,14 @@ def test_an_axis_that_is_not_found_is_left_to_the_eye(span, shown, tmp_path, cap
     assert metrics["shown"][0] < metrics["shown"][-1]
 
 
+@pytest.mark.parametrize("span", [("-90", "-80"), ("30", "20")])
+def test_a_span_that_is_none_is_not_left_to_the_eye(span, scan, tmp_path, capsys):
+    out = tmp_path / "center"
+    assert main(["center", str(scan.counts), "--span", *span, "--out", str(out)]) == 3
+    assert "shows slices" not in capsys.readouterr().err
+    assert not (out / "report.html").exists()
+
+
 def test_center_of_a_row_that_is_not_there(scan, tmp_path, capsys):
     assert main(["center", str(scan.counts), "--row", "7", "--out", str(tmp_path / "c")]) == 3
     assert "--row is 7" in capsys.readouterr().err

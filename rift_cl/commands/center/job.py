@@ -87,7 +87,9 @@ class CenterJob:
         try:
             found = find_axis(self.scan, self.device, span=self.settings.span)
         except InputError as error:
-            why = str(error).removesuffix(GIVE_IT)
+            if GIVE_IT not in str(error):
+                raise  # of what was asked for, or of the file: no slice tells more
+            why = str(error).replace(GIVE_IT, "")
             yield from self._left_to_the_eye(sinogram, why)
             first, *_, last = self.metrics["shown"]
             raise InputError(
