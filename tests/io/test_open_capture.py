@@ -199,10 +199,35 @@ def test_a_frame_overrides_what_stands_for_all(tmp_path: Path) -> None:
     made.changed(path, 2, camera_angle_x=np.pi / 2, k1=0.125)
     first, second, third = open_capture(path).views
     np.testing.assert_array_equal(first.camera.K, K)
-    np.testing.assert_array_equal(second.camera.K, [[33, 0, 6.5], [0, 21, 3.5], [0, 0, 1]])
+    np.testing.assert_array_equal(second.camera.K, [[33, 0, 6.5], [0, 33, 3.5], [0, 0, 1]])
     np.testing.assert_allclose(third.camera.K[0, 0], made.WIDTH / 2)
     assert first.lens is None and second.lens is None
     assert third.lens == Lens("OPENCV", (0.125, 0, 0, 0), third.camera.K)
+
+
+@pytest.mark.parametrize(
+    ("top", "frame", "wanted"),
+    [
+        ({"fl_x": 100, "fl_y": 110}, {}, (100, 110)),
+        ({"fl_x": 100, "fl_y": 110}, {"fl_x": 170}, (170, 170)),
+        ({"fl_x": 100, "fl_y": 110}, {"fl_x": 170, "fl_y": 171}, (170, 171)),
+        ({"fl_x": 100, "fl_y": 110}, {"camera_angle_x": np.pi / 2}, (made.WIDTH / 2,) * 2),
+        ({"camera_angle_y": np.pi / 2}, {}, (made.HEIGHT / 2,) * 2),
+        ({"camera_angle_x": 0.8}, {"x_fov": 90}, (made.WIDTH / 2,) * 2),
+        ({"x_fov": 90.0, "y_fov": 90.0}, {}, (made.WIDTH / 2, made.HEIGHT / 2)),
+        ({"x_fov": 90, "fl_x": made.WIDTH / 2 + 0.01}, {}, (made.WIDTH / 2,) * 2),
+    ],
+)
+def test_both_focal_lengths_are_those_of_the_frame_or_of_the_file(
+    tmp_path: Path,
+    top: dict[str, float],
+    frame: dict[str, float],
+    wanted: tuple[float, float],
+) -> None:
+    """A frame's own and the file's belong to two cameras; angles in degrees are instant-ngp's."""
+    path = made.transforms(tmp_path, **{"fl_x": None, "fl_y": None, **top})
+    camera = open_capture(made.changed(path, 0, **frame)).views[0].camera
+    np.testing.assert_allclose(np.diag(camera.K)[:2], wanted, rtol=1e-12)
 
 
 @pytest.mark.parametrize(

@@ -1,11 +1,12 @@
 """Views from a transforms.json: the flavours of NeRF's synthetic scenes, instant-ngp, nerfstudio.
 
-Intrinsics stand once for all frames or in each of them, where they take precedence. Poses are
-camera-to-world with OpenGL's axes. Coefficients of a lens have their names, or stand in the list
-'distortion_params' of nerfstudio, whose 'fisheye_crop_radius' is the circle that a fisheye fills. A
-lens with an opening has 'aperture_radius', 'focus_distance' (without it the focus is at infinity)
-and 'wavelength', in the poses' unit. Fields that say nothing about where and through what lens a
-photograph was taken are left alone, but for nerfstudio's lists of what is trained on and scored.
+Intrinsics stand once for all frames or in each of them, where they take precedence; focal lengths
+are those of ``transforms_focal``. Poses are camera-to-world with OpenGL's axes. Coefficients of a
+lens have their names, or stand in the list 'distortion_params' of nerfstudio, whose
+'fisheye_crop_radius' is the circle that a fisheye fills. A lens with an opening has
+'aperture_radius', 'focus_distance' (without it the focus is at infinity) and 'wavelength', in the
+poses' unit. Fields that say nothing about where and through what lens a photograph was taken are
+left alone, but for nerfstudio's lists of what is trained on and scored.
 """
 
 from __future__ import annotations
@@ -25,6 +26,7 @@ from rift_cl.io.captures.capture_paths import CaptureFolder, mask_of
 from rift_cl.io.captures.point_cloud import read_point_cloud
 from rift_cl.io.captures.poses import view_of_opengl
 from rift_cl.io.captures.split_lists import split_by_lists
+from rift_cl.io.captures.transforms_focal import focal_lengths
 from rift_cl.io.captures.view import Capture, View, check_views, located
 from rift_cl.io.images.read_picture import read_picture_header
 from rift_cl.io.json_fields import Fields, read_json_object
@@ -121,7 +123,7 @@ def _view(folder: CaptureFolder, frame: Fields, top: Fields, by_name: bool) -> V
     image = folder.image(where, name)
     mask = own.text("mask_path")
     size = _size(fields, image)
-    K = _intrinsics(own, fields, size)
+    K = _intrinsics(own, top, size)
     pose = own.pose("transform_matrix")
     model, coefficients = _distortion(own, top)
     aperture = _aperture(fields)
@@ -156,14 +158,11 @@ def _size(fields: Fields, image: Path) -> tuple[int, int]:
     return height, width
 
 
-def _intrinsics(own: Fields, fields: Fields, size: tuple[int, int]) -> list[list[float]]:
-    fx, fy = _focal(own, fields, "x", size[1]), _focal(own, fields, "y", size[0])
-    if fx is None:
-        raise FileFormatError(
-            f"{fields.where}: has neither 'fl_x' nor 'camera_angle_x', the focal length is wanted"
-        )
+def _intrinsics(own: Fields, top: Fields, size: tuple[int, int]) -> list[list[float]]:
+    fx, fy = focal_lengths(own, top, size)
+    fields = own.within(top)
     cx, cy = _center(fields, "cx", "w", size[1]), _center(fields, "cy", "h", size[0])
-    return [[fx, 0, cx], [0, fx if fy is None else fy, cy], [0, 0, 1]]
+    return [[fx, 0, cx], [0, fy, cy], [0, 0, 1]]
 
 
 def _center(fields: Fields, name: str, edge: str, extent: int) -> float:
@@ -179,22 +178,6 @@ def _center(fields: Fields, name: str, edge: str, extent: int) -> float:
             "in 'w' and 'h'"
         )
     return center
-
-
-def _focal(own: Fields, fields: Fields, axis: str, extent: int) -> float | None:
-    """Focal length in pixels; the frame's own fields come before those of the file."""
-    for source in (own, fields):
-        focal, angle = source.number(f"fl_{axis}"), source.number(f"camera_angle_{axis}")
-        if focal is not None:
-            return focal
-        if angle is not None:
-            if not 0 < angle < math.pi:
-                raise InputError(
-                    f"{own.where}: 'camera_angle_{axis}' is {angle:g}, wanted radians between 0 "
-                    "and pi"
-                )
-            return extent / 2 / math.tan(angle / 2)
-    return None
 
 
 def _aperture(fields: Fields) -> Aperture | None:
