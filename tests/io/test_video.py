@@ -17,6 +17,7 @@ from rift_cl.io.captures.video import check_video, holds_video, sharpest_frames,
 HEIGHT, WIDTH = 48, 64
 # The sharp frames; in a stretch of 5 the others are one grey.
 SHARP = (2, 5, 14, 16)
+COLOUR_TAGS = ("color_primaries", "color_trc", "colorspace")
 
 
 def checkers(number: int) -> np.ndarray:
@@ -45,6 +46,27 @@ def store_video(
                 setattr(stream.codec_context, name, value)
             for codes in frames:
                 container.mux(stream.encode(av.VideoFrame.from_ndarray(codes, "rgb24")))
+        container.mux(stream.encode())
+    return path
+
+
+def store_planes(
+    path: Path, size: tuple[int, int], codes: tuple[float, ...], colorspace: int
+) -> Path:
+    """A video of one frame of one colour, given as codes of Y', Cb and Cr."""
+    av = pytest.importorskip("av")
+    height, width = size
+    frame = av.VideoFrame(width, height, "yuv420p")
+    frame.colorspace = colorspace
+    for plane, code in zip(frame.planes, codes, strict=True):
+        plane.update(np.full(plane.buffer_size, round(code), np.uint8).tobytes())
+    with av.open(str(path), "w") as container:
+        stream = container.add_stream("mpeg4", rate=10)
+        stream.height, stream.width, stream.pix_fmt, stream.bit_rate = *size, "yuv420p", 4_000_000
+        # The file keeps all three or none.
+        for name in COLOUR_TAGS:
+            setattr(stream.codec_context, name, colorspace)
+        container.mux(stream.encode(frame))
         container.mux(stream.encode())
     return path
 
@@ -136,10 +158,39 @@ def test_high_dynamic_range_is_said(tmp_path: Path, curve: int, name: str | None
 
 
 def test_pixels_that_are_not_square_are_said(tmp_path: Path) -> None:
-    (note,) = video_notes(
-        store_video(tmp_path / "a.mp4", [checkers(2)], sample_aspect_ratio=Fraction(4, 3))
-    )
+    tags = {**dict.fromkeys(COLOUR_TAGS, 1), "sample_aspect_ratio": Fraction(4, 3)}
+    (note,) = video_notes(store_video(tmp_path / "a.mp4", [checkers(2)], **tags))
     assert "1.33 times as wide as high" in note
+
+
+@pytest.mark.parametrize(
+    ("size", "tag", "weights", "matrix"),
+    [
+        ((720, 1280), 2, (0.2126, 0.0722), "BT.709"),
+        ((48, 1280), 2, (0.2126, 0.0722), "BT.709"),
+        ((576, 64), 2, (0.299, 0.114), "BT.601"),
+        ((48, 64), 1, (0.2126, 0.0722), None),
+    ],
+)
+def test_colours_of_a_video_that_names_no_matrix_are_those_of_players(
+    tmp_path: Path,
+    size: tuple[int, int],
+    tag: int,
+    weights: tuple[float, float],
+    matrix: str | None,
+) -> None:
+    """Red in Y'CbCr by Rec. ITU-R BT.709 and BT.601, from the weights of red and blue."""
+    wr, wb = weights
+    rgb = np.array([0.8, 0.1, 0.1])
+    y = np.dot([wr, 1 - wr - wb, wb], rgb)
+    planes = 16 + 219 * y, 128 + 112 * (rgb[2] - y) / (1 - wb), 128 + 112 * (rgb[0] - y) / (1 - wr)
+    path = store_planes(tmp_path / "a.mp4", size, planes, tag)
+    run(sharpest_frames(path, tmp_path / "frames", 1))
+    found = read_image(tmp_path / "frames" / "00001.jpg").mean((0, 1))
+    np.testing.assert_allclose(found, rgb, atol=4 / 255)
+    notes = video_notes(path)
+    assert len(notes) == (matrix is not None)
+    assert all(f"{matrix} is assumed" in note for note in notes)
 
 
 def test_a_video_that_nothing_decodes(video: Path) -> None:

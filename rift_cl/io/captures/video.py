@@ -54,7 +54,7 @@ def check_video(path: Path) -> None:
 
 
 def video_notes(path: Path) -> list[str]:
-    """What of a video is taken otherwise than a player shows it, a sentence each.
+    """What of a video is assumed, or taken otherwise than a player shows it, a sentence each.
 
     Raises:
         RiftError: see ``check_video``.

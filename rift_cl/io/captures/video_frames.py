@@ -20,10 +20,12 @@ from rift_cl.io.boundary import check_claim, reading
 _JUDGED = 480
 # Curves of high dynamic range, by their numbers in ITU-T H.273.
 _HDR = {16: "PQ", 18: "HLG"}
+# The number there of a matrix that a video does not name.
+_UNSPECIFIED = 2
 
 
 def notes_of_video(path: Path) -> list[str]:
-    """What of a video is taken otherwise than a player shows it, a sentence each.
+    """What of a video is assumed, or taken otherwise than a player shows it, a sentence each.
 
     Raises:
         InputError: there are no pictures in the file.
@@ -31,8 +33,13 @@ def notes_of_video(path: Path) -> list[str]:
     """
     with _stream(path) as (_, stream):
         curve = _HDR.get(int(stream.codec_context.color_trc))
-        aspect = stream.sample_aspect_ratio or 1
+        aspect, matrix = stream.sample_aspect_ratio or 1, _assumed_matrix(stream.codec_context)
     notes = []
+    if matrix:
+        notes.append(
+            f"the video does not say by which matrix its colours are coded: {matrix} is assumed, "
+            "as players do for its size"
+        )
     if curve:
         notes.append(
             f"the video has high dynamic range ({curve}), which is not undone: colours come out "
@@ -141,5 +148,30 @@ def _sharpness(path: Path, frame: Any) -> float:
 def _upright(path: Path, frame: Any) -> NDArray[np.uint8]:
     """The frame's colours, turned as the file says that it is shown."""
     with reading(path, "the video"):
-        codes = frame.to_ndarray(format="rgb24")
+        codes = frame.reformat(format="rgb24", src_colorspace=_matrix(frame)).to_ndarray()
     return np.ascontiguousarray(np.rot90(codes, round(frame.rotation / 90)))
+
+
+def _matrix(frame: Any) -> Any:
+    """The matrix to decode a frame by, in PyAV's terms; None for its own."""
+    from av.video.reformatter import Colorspace
+
+    matrices = {None: None, "BT.709": Colorspace.ITU709, "BT.601": Colorspace.ITU601}
+    return matrices[_assumed_matrix(frame)]
+
+
+def _assumed_matrix(pictures: Any) -> str | None:
+    """By which matrix luma and chroma are decoded where a video names none; None where it does.
+
+    FFmpeg takes BT.601 whatever the size. Players take BT.709 of what is larger than the television
+    of old (mpv's rule).
+
+    Args:
+        pictures: a frame, or the context that frames are decoded in.
+    """
+    layout = pictures.format
+    if layout is None or layout.is_rgb or len(layout.components) < 3:
+        return None
+    if int(pictures.colorspace) != _UNSPECIFIED:
+        return None
+    return "BT.709" if pictures.width >= 1280 or pictures.height > 576 else "BT.601"
