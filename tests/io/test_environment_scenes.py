@@ -25,8 +25,10 @@ from rift_cl.basis.angular.environment import (
 from rift_cl.commands.inputs.opened_scene import OpenedScene
 from rift_cl.commands.inputs.scene_input import SceneInput
 from rift_cl.errors import FileFormatError, InputError, NonFiniteError, ShapeError
+from rift_cl.io.images.display_light import to_linear
 from rift_cl.io.images.environment_map import read_environment_map, write_environment_map
 from rift_cl.io.images.image import read_image, write_png
+from rift_cl.io.images.pixels import write_pixels
 
 LIGHT = ("normals", "reflectance", "environment")
 
@@ -163,6 +165,15 @@ def directions_of(count, seed=4):
     return found / np.linalg.norm(found, axis=1, keepdims=True)
 
 
+def pixels_of(rows):
+    """Directions and solid angles, to a factor, of the pixels of a picture."""
+    polar, azimuth = np.pi * (np.arange(rows) + 0.5) / rows, np.arange(2 * rows) + 0.5
+    azimuth = np.pi * (1 - azimuth / rows)
+    ring = np.sin(polar)[:, None]
+    ways = [ring * np.cos(azimuth), ring * np.sin(azimuth), np.cos(polar)[:, None] + 0 * azimuth]
+    return np.stack(ways, -1).reshape(-1, 3), np.repeat(np.sin(polar), 2 * rows)
+
+
 def relit(tmp_path, picture, log_sharpness, lobes=128):
     """What a splat of tint 1 shows under a picture, (D, 3), as the commands light it."""
     write_png(tmp_path / "light.png", picture)
@@ -187,11 +198,7 @@ def test_a_soft_sky_beside_a_sharp_sun_is_soft(tmp_path):
     picture[14:17, 40:46] = 1
     shown = relit(tmp_path, picture, 9.0)[:, 0]
     mirrored = directions_of(4000) * [1, 1, -1]
-    polar, azimuth = (np.arange(64) + 0.5) / 64 * np.pi, (1 - (np.arange(128) + 0.5) / 64) * np.pi
-    ring = np.sin(polar)[:, None]
-    ways = [ring * np.cos(azimuth), ring * np.sin(azimuth), np.cos(polar)[:, None] + 0 * azimuth]
-    ways = np.stack(ways, -1).reshape(-1, 3)
-    weights = np.repeat(np.sin(polar), 128)
+    ways, weights = pixels_of(64)
     kernel = np.exp(lattice_sharpness(128) * (mirrored @ ways.T - 1)) * weights
     blurred = kernel @ picture[..., 0].ravel() / kernel.sum(1)
     sun = ways[15 * 128 + 43]
@@ -211,6 +218,24 @@ def test_small_lamps_keep_their_light():
         seen = np.exp(lattice_sharpness(64) * (ways @ light_axes(count).T - 1))
         shown = seen @ np.exp(found) * lattice_sharpness(64) / lattice_sharpness(count)
         np.testing.assert_allclose(shown.mean(0), lamp.mean(0), rtol=1e-3)
+
+
+@pytest.mark.parametrize("display", [True, False])
+@pytest.mark.parametrize("rows", [64, 150])
+@pytest.mark.parametrize("place", [[0.6, 0.3, 0.74], [0.0, 0.0, 1.0]])
+def test_a_lamp_keeps_its_power_whatever_light_the_fit_is_in(tmp_path, display, rows, place):
+    """The curve of display light came before the blur: a lamp lost half of its power and more."""
+    ways, weights = pixels_of(rows)
+    picture = np.full((len(ways), 3), 0.1, np.float32)
+    lamp = (ways @ place).argmax()
+    picture[lamp] += 0.6 * weights.sum() / weights[lamp]
+    write_pixels(tmp_path / "a.exr", picture.reshape(rows, -1, 3), format="openexr", attributes={})
+    found = read_environment_map(tmp_path / "a.exr", 32, display=display)
+    ways, weights = pixels_of(64)
+    shown = light_from(found.astype(float), ways, 32).astype(np.float32)
+    if display:
+        to_linear(shown)
+    np.testing.assert_allclose(weights @ shown / weights.sum(), 0.7, rtol=0.02)
 
 
 def test_denser_lights_are_seen_as_blurred_as_those_of_fits():

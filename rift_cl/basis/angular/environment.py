@@ -66,11 +66,19 @@ def start_reflectance(count: int) -> Floats:
     return np.tile([*3 * logits[:1], *3 * logits[1:], log(_SHARPNESS)], (count, 1))
 
 
-def light_from(environment: Floats, directions: Floats) -> Floats:
-    """The light itself, (..., 3), that comes from directions (..., 3) of length one."""
+def light_from(environment: Floats, directions: Floats, like: int | None = None) -> Floats:
+    """The light itself, (..., 3), that comes from directions (..., 3) of length one.
+
+    Args:
+        environment: (K, 3) logarithms of the radiance.
+        directions: where it comes from.
+        like: number of lobes of the light that it is as blurred as, at most K, so that it is what
+            ``blunted`` mirrors show; K when not given.
+    """
     count = len(environment)
+    own, seen = lattice_sharpness(count), lattice_sharpness(like or count)
     near = directions @ environment_axes(count).T - 1
-    return np.asarray(np.exp(lattice_sharpness(count) * near) @ np.exp(environment))
+    return np.asarray(np.exp(seen * near) @ (np.exp(environment) * seen / own))
 
 
 def reflected_light(

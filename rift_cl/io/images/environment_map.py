@@ -61,7 +61,8 @@ def read_environment_map(
 
     K is ``lobes`` where such a light makes the picture, as it makes that of a fit, and otherwise
     ``picture_lobes`` of it, to be seen by surfaces that are ``blunted``: on a denser lattice light
-    is as blurred, and does not ripple.
+    is as blurred, and does not ripple. What a mirror shows of that has the picture's sum in linear
+    light.
 
     Args:
         path: a picture twice as wide as high; OpenEXR and HDR in linear light, others in display
@@ -74,6 +75,19 @@ def read_environment_map(
         FileFormatError: it is damaged, or no picture.
         NonFiniteError: it holds NaN or infinity.
     """
+    light, weights = _sampled(_linear_picture(path))
+    directions, _ = _directions(len(light))
+    light = light.reshape(-1, 3)
+    wanted = _in_display_light(light) if display else light
+    found = environment_of(wanted, directions, weights, lobes)
+    off = weights @ (light_from(found, directions) - wanted) ** 2
+    if off.sum() > _EXACT**2 * (weights @ wanted**2).sum():
+        found = _denser(light, directions, weights, lobes, display=display)
+    return found.astype(np.float32)
+
+
+def _linear_picture(path: str | os.PathLike[str]) -> NDArray[np.float32]:
+    """The picture (y, x, 3) in linear light, none of it negative; see ``read_environment_map``."""
     picture = read_image(path)
     check_finite(picture, name=f"{path}: the picture")
     if picture.ndim == 2:
@@ -92,25 +106,63 @@ def read_environment_map(
     light = np.maximum(np.ascontiguousarray(picture[..., :3], np.float32), 0)
     if Path(path).suffix.lower() not in _LINEAR:
         to_linear(light)
-    if rows > _MOST_ROWS:
-        # A mean over each pixel: a small lamp must not fall between two.
-        light = resize_local_mean(light, (_MOST_ROWS, 2 * _MOST_ROWS), channel_axis=2)
-    if display:
-        to_display(light)
-    directions, weights = _directions(len(light))
-    wanted = light.reshape(-1, 3).astype(float)
-    found = environment_of(wanted, directions, weights, lobes)
-    off = weights @ (light_from(found, directions) - wanted) ** 2
-    if off.sum() > _EXACT**2 * (weights @ wanted**2).sum():
-        found = environment_of(wanted, directions, weights, picture_lobes(lobes), lobes)
-    return found.astype(np.float32)
+    return light
+
+
+def _sampled(picture: NDArray[np.float32]) -> tuple[Floats, Floats]:
+    """A picture of 64 rows at most, and the solid angles (M,) of its pixels, to a factor.
+
+    Its pixels are means over solid angles: a small lamp neither falls between two nor, near a
+    pole, changes its power.
+    """
+    across = np.sin(_polar(len(picture)))[:, None]
+    if len(picture) > _MOST_ROWS:
+        size = (_MOST_ROWS, 2 * _MOST_ROWS)
+        power = picture * across[..., None].astype(np.float32)
+        across = resize_local_mean(across, (_MOST_ROWS, 1))
+        picture = resize_local_mean(power, size, channel_axis=2) / across[..., None]
+    return picture.astype(float), np.repeat(across, picture.shape[1])
+
+
+def _denser(
+    light: Floats, directions: Floats, weights: Floats, lobes: int, *, display: bool
+) -> Floats:
+    """A light of ``picture_lobes`` that ``blunted`` mirrors show as sharp as one of ``lobes``.
+
+    Light adds up and display light does not: a lamp is blurred in linear light, or it would lose
+    most of its power to the curve. What is blurred so is smooth in display light as well.
+
+    Args:
+        light: (M, 3) linear light.
+        directions: (M, 3) where it comes from.
+        weights: (M,) solid angles, to a factor.
+        lobes: of the scene's own light.
+        display: whether the radiance shall be in display light.
+    """
+    dense = picture_lobes(lobes)
+    found = environment_of(light, directions, weights, dense, lobes)
+    if not display:
+        return found
+    directions, weights = _directions(_MOST_ROWS)
+    blurred = _in_display_light(light_from(found, directions, lobes))
+    return environment_of(blurred, directions, weights, dense, lobes)
+
+
+def _in_display_light(light: Floats) -> Floats:
+    curved = light.astype(np.float32)
+    to_display(curved)
+    return curved.astype(float)
 
 
 def _directions(rows: int) -> tuple[Floats, Floats]:
     """Unit vectors (M, 3) of the pixels of a picture, row by row, and their solid angles."""
-    polar = np.pi * (np.arange(rows) + 0.5) / rows
     azimuth = np.pi * (1 - (np.arange(2 * rows) + 0.5) / rows)
-    high, round_ = np.meshgrid(polar, azimuth, indexing="ij")
+    high, round_ = np.meshgrid(_polar(rows), azimuth, indexing="ij")
     across = np.sin(high)
     found = np.stack([across * np.cos(round_), across * np.sin(round_), np.cos(high)], -1)
     return found.reshape(-1, 3), across.ravel()
+
+
+def _polar(rows: int) -> Floats:
+    """The polar angles of a picture's rows."""
+    return np.asarray(np.pi * (np.arange(rows) + 0.5) / rows)
