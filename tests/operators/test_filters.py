@@ -268,6 +268,8 @@ def test_responses_that_are_no_finite_numbers_are_refused(function):
         (lambda f: 1 / (1 + f), "times the ramp"),
         (lambda f: -f, "is -1 times the ramp"),
         (np.zeros_like, "keeps 0 % of the ramp"),
+        (lambda f: 2 * f, "is 2 times the ramp"),
+        (lambda f: 0.7 * f * (f < 9), "is 0.7 times the ramp"),
     ],
 )
 def test_responses_that_are_no_ramp_are_doubted(device, function, said):
@@ -286,11 +288,29 @@ def test_a_cone_doubts_responses_as_parallel_beams_do(device):
 
 def test_ramps_of_ones_own_are_not_doubted(device, recwarn):
     A = Projector(Grid((8, 8), 0.01), Parallel(np.arange(6.0), 13, pitch=0.01), device=device)
-    for function in (lambda f: f, lambda f: f * np.cos(f / f.max()), lambda f: 0.7 * f * (f < 9)):
+    for function in (lambda f: f, lambda f: f * np.cos(f / f.max()), lambda f: 1.1 * f * (f < 9)):
         fbp(A, white(6, 13), function)
     fbp(A, white(6, 13), "high-pass")
     fbp(A, white(6, 13), HighPass(0.3))
     assert not [str(each.message) for each in recwarn if "ramp" in str(each.message)]
+
+
+@pytest.mark.parametrize("bins", [16, 91])
+@pytest.mark.parametrize("cutoff", [0.2, 1.0])
+@pytest.mark.parametrize("window", WINDOWS)
+def test_the_windows_as_ones_own_responses_are_not_doubted(window, cutoff, bins):
+    def windowed(f):
+        share = f / f.max() / cutoff
+        return f * WINDOWS[window](share) * (share <= 1)
+
+    assert Response(windowed).doubt(bins, 0.3) is None
+
+
+def test_a_ramp_interpolated_between_its_transformed_samples_is_not_doubted():
+    taps, pitch = ramp_taps(BINS, 0.3), 0.3
+    values = np.abs(np.fft.rfft(taps)) * pitch
+    sampled = np.arange(values.size) / (taps.size * pitch)
+    assert Response(lambda f: np.interp(f, sampled, values)).doubt(BINS, pitch) is None
 
 
 @pytest.mark.parametrize("gains", [[1, 2], np.ones((3, 1)), 1.0])

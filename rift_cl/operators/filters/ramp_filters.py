@@ -49,8 +49,10 @@ HIGH_PASS = "high-pass"
 # A response that is no ramp is sampled this many times finer than the detector can tell apart.
 _OVERSAMPLING = 16
 # A response that keeps less than such a part of the ramp, or differs from it by more than such a
-# factor where both begin, is hardly meant so.
-_LEAST_OF_RAMP, _LEVEL = 1e-3, 2.0
+# factor where both begin, is hardly meant so. Factors that come of another convention (2, pi / 2,
+# the root of 2) are greater; less are windows that end low, and a ramp whose exact samples were
+# transformed and interpolated, 1.18 times the ramp between zero and the first frequency.
+_LEAST_OF_RAMP, _LEVEL = 1e-3, 1.25
 
 
 @runtime_checkable
