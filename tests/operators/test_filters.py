@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from rift_cl import Fan, Grid, HighPass, Parallel, Projector, Ramp, Response, dot_test, fbp
-from rift_cl.errors import InputError, ShapeError
+from rift_cl.errors import InputError, ResourceLimitError, ShapeError
 from rift_cl.operators import FILTERS, ViewFilter, as_filter, register_filter
 from rift_cl.operators.filters.ramp_filters import WINDOWS, Finer
 from rift_cl.reference import filter_rows, ramp_taps, response_taps, shepp_logan_taps
@@ -329,3 +329,12 @@ def test_gains_must_be_finite(device, bad):
 def test_rows_must_be_there(device, rows):
     with pytest.raises(InputError, match="rows"):
         ViewFilter(Parallel([0.0, 1.0], 5), Ramp(), rows=rows, device=device)
+
+
+def test_detectors_that_the_host_has_no_memory_for_are_refused(monkeypatch):
+    monkeypatch.setattr("rift_cl.cl.budget.host_budget", lambda: 1 << 30)
+    grid, angles, bins = Grid((8, 8)), np.arange(6.0), 2**31
+    with pytest.raises(ResourceLimitError, match="filter of 2147483648 bins"):
+        ViewFilter(Parallel(angles, bins), Ramp())
+    with pytest.raises(ResourceLimitError, match="detector of 2147483648 bins"):
+        Projector(grid, Fan(angles, bins, 1e-9, 100, 200))
