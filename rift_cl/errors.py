@@ -169,6 +169,25 @@ def not_installed(what: str, package: str, alone: str, instead: str = "") -> Inp
     )
 
 
+def checked_flag(where: str, name: str, value: object) -> bool:
+    """A truth value, given as one: of words, "no" is as true as any other.
+
+    Args:
+        where: what takes it.
+        name: of the argument.
+        value: what was given.
+
+    Raises:
+        InputError: it is none.
+    """
+    one: typing.Any = value
+    if getattr(one, "shape", None) == ():
+        one = one.item()
+    if not isinstance(one, bool):
+        raise InputError(f"{where}: {name} is {reprlib.repr(value)}, wanted True or False")
+    return one
+
+
 def check_type(where: str, name: str, value: object, wanted: type) -> None:
     """Refuse an argument of another type by name, before something looks for its parts.
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from typing import Generic, TypeVar
 
-from rift_cl.errors import InputError
+from rift_cl.errors import InputError, checked_flag
 
 T = TypeVar("T")
 
@@ -45,6 +45,7 @@ class Registry(Generic[T]):
         """
         if not isinstance(name, str) or not name:
             raise InputError(f"the name of a {self.kind} is {name!r}, wanted a text")
+        checked_flag(f"the {self.kind} {name!r}", "replace", replace)
         if name in self._ours & self._entries.keys() and replace:
             raise InputError(f"the {self.kind} {name!r} is the package's own: choose another name")
         if name in self._entries and not replace:

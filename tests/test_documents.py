@@ -286,6 +286,19 @@ def test_every_option_that_a_text_names_is_one_of_a_command_or_a_tool(helps):
         assert named - known - ELSEWHERE == set(), page.name
 
 
+def test_names_of_the_package_on_a_page_are_there_after_its_import():
+    """What another test has imported is there in any case, so that the package must list it."""
+    texts = [page.read_text() for page in (*PAGES, *(ROOT / "examples").glob("*.py"))]
+    named = {
+        name for text in texts for name in re.findall(r"\brift\.([A-Za-z]\w*(?:\.\w+)?)", text)
+    }
+    assert {"reconstruct.variation_weight", "io.read_known_view", "Projector"} <= named
+    for name in sorted(named):
+        first, _, second = name.partition(".")
+        assert first in rift.__all__, name
+        assert not second or hasattr(getattr(rift, first), second), name
+
+
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
 def test_what_a_page_links_to_exists(page):
     for link in re.findall(r"\]\(([^)\s]+)\)", page.read_text()):

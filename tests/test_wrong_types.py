@@ -7,7 +7,13 @@ import numpy as np
 import pytest
 
 import rift_cl as rift
-from rift_cl.errors import WrongTypeError, check_type
+from rift_cl.errors import InputError, WrongTypeError, check_type, checked_flag
+from rift_cl.reconstruct import OrderedSubsets
+from rift_cl.reconstruct.preprocess import remove_zingers
+from rift_cl.reconstruct.preprocess.paganin import Propagation
+from rift_cl.reconstruct.preprocess.rings import LargeStripes
+from rift_cl.sampling import KeepOut, Sphere
+from rift_cl.train import DefaultSettings, PixelLoss
 
 GRID = rift.Grid((8, 8))
 SCAN = rift.Parallel(np.arange(6) * np.pi / 6, 12)
@@ -29,6 +35,33 @@ CALLS = {
 }
 
 
+A, ONES = rift.Projector(GRID, SCAN), np.ones((6, 12), np.float32)
+FLAGS = {
+    "sirt: nonnegative": lambda flag: rift.sirt(A, ONES, steps=1, nonnegative=flag),
+    "sirt of subsets: nonnegative": lambda flag: OrderedSubsets(
+        A, ONES, subsets=2, nonnegative=flag
+    ),
+    "tv: nonnegative": lambda flag: rift.tv(A, ONES, 0.1, steps=1, nonnegative=flag),
+    "fista: nonnegative": lambda flag: rift.tv(
+        A, ONES, 0.1, steps=1, nonnegative=flag, method="fista"
+    ),
+    "cheapest_projector: iterative": lambda flag: rift.cheapest_projector(
+        GRID, SCAN, iterative=flag
+    ),
+    "remove_zingers: dark": lambda flag: remove_zingers(ONES, dark=flag),
+    "LargeStripes: normalise": lambda flag: LargeStripes(normalise=flag),
+    "phase retrieval: generalised": lambda flag: Propagation(1e-6, 0.1, 20, 100, flag),
+    "calibrate: orbit": lambda flag: rift.calibrate(ONES, SCAN, orbit=flag),
+    "plan: compare": lambda flag: rift.plan(target(), 1, compare=flag),
+    "KeepOut: hides": lambda flag: KeepOut(Sphere((0, 0, 0), 1), flag),
+    "filter 'own': replace": lambda flag: rift.register_filter("own", np.sqrt, replace=flag),
+    "SplatSettings: antialiased": lambda flag: rift.SplatSettings(antialiased=flag),
+    "DefaultSettings: absgrad": lambda flag: DefaultSettings(absgrad=flag),
+    "PixelLoss: surrogate": lambda flag: PixelLoss("d", "m", surrogate=flag),
+    "open_scan: reversed": lambda flag: rift.open_scan("none.h5", reversed=flag),
+}
+
+
 def target():
     return rift.Target((0.0, 0.0, 0.0), 1.0)
 
@@ -38,6 +71,18 @@ def target():
 def test_an_argument_of_a_wrong_type_is_named(name):
     with pytest.raises(WrongTypeError, match=rf"\b{name}\b"):
         CALLS[name](object())
+
+
+@pytest.mark.each
+@pytest.mark.parametrize("name", FLAGS)
+def test_a_word_is_no_truth_value(name):
+    with pytest.raises(InputError, match=f"{name.split()[-1]} is 'no', wanted True or False"):
+        FLAGS[name]("no")
+
+
+def test_truth_values_of_numpy_are_some():
+    given = (True, False, np.True_, np.array(False))
+    assert [checked_flag("f", "x", each) for each in given] == [True, False, True, False]
 
 
 def test_other_targets_than_targets_are_named():

@@ -160,6 +160,23 @@ def check_array(size: int, largest: int, *, what: str, instead: str = "") -> Non
         )
 
 
+def check_host(size: int, *, what: str) -> None:
+    """Refuse arrays that the host has no memory for, before any of them is made.
+
+    Args:
+        size: bytes of the arrays.
+        what: what needs them, for the error.
+
+    Raises:
+        ResourceLimitError: they are larger than what may be taken.
+    """
+    if size > (most := host_budget()):
+        raise ResourceLimitError(
+            f"{what} takes {format_bytes(size)} of the host's memory, of which "
+            f"{format_bytes(most)} may be taken: make the problem smaller"
+        )
+
+
 def _or(instead: str) -> str:
     return f"; {instead}" if instead else ""
 

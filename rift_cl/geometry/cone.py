@@ -22,7 +22,7 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from rift_cl.errors import InputError, ShapeError
+from rift_cl.errors import InputError, ShapeError, checked_flag
 from rift_cl.geometry.fan import Fan, fan_angles
 from rift_cl.geometry.numbers import real_numbers
 from rift_cl.geometry.scan_value import (
@@ -31,7 +31,6 @@ from rift_cl.geometry.scan_value import (
     checked_center,
     checked_count,
     checked_distances,
-    checked_flag,
     checked_length,
     refuse_round_arcs,
 )

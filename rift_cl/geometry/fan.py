@@ -18,13 +18,13 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from rift_cl.errors import checked_flag
 from rift_cl.geometry.scan_value import (
     ScanValue,
     checked_angles,
     checked_center,
     checked_count,
     checked_distances,
-    checked_flag,
     checked_length,
     refuse_round_arcs,
 )

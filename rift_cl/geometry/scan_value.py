@@ -306,14 +306,3 @@ def refuse_round_arcs(
             f"source ends at {math.degrees(farthest):.3g} degrees from its axis; "
             "check that pitch and source_to_detector are in one unit"
         )
-
-
-def checked_flag(owner: str, name: str, value: Any) -> bool:
-    """A truth value.
-
-    Raises:
-        InputError: it is none.
-    """
-    if not isinstance(value, bool | np.bool_):
-        raise InputError(f"{owner}: {name} is {value!r}, wanted True or False")
-    return bool(value)

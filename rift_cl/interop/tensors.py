@@ -13,7 +13,7 @@ import torch
 
 from rift_cl.cl.device import Device
 from rift_cl.cl.host_arrays import as_plain, upload
-from rift_cl.errors import DeviceError, DTypeError, ShapeError
+from rift_cl.errors import DeviceError, DTypeError, InputError, ShapeError
 
 
 def check_tensor(
@@ -62,8 +62,23 @@ def check_tensor(
 
 
 def to_host(tensor: torch.Tensor) -> Any:
-    """A tensor's numbers as a C-ordered NumPy array, without a copy where they are one."""
-    return tensor.detach().cpu().contiguous().numpy()
+    """A tensor's numbers as a C-ordered NumPy array, without a copy where they are one.
+
+    Raises:
+        InputError: it stands for a batch of the kind that torch had before ``torch.func``, whose
+            numbers torch gives to its own functions alone.
+    """
+    try:
+        plain = tensor.detach()
+    except RuntimeError as error:
+        if "Batching rule" not in str(error):
+            raise
+        raise InputError(
+            "gradients came as a batch of the kind that torch had before torch.func "
+            "(is_grads_batched=True, or vectorize=True of torch.autograd.functional): "
+            "take torch.func.jacrev, jacfwd or vmap of vjp"
+        ) from error
+    return plain.cpu().contiguous().numpy()
 
 
 def to_device(device: Device, tensor: torch.Tensor) -> Any:

@@ -26,7 +26,7 @@ import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
 from rift_cl.cl.array import DeviceArray
-from rift_cl.cl.budget import plan_chunks
+from rift_cl.cl.budget import format_bytes, plan_chunks
 from rift_cl.cl.device import Device
 from rift_cl.cl.elementwise import put_inside, with_own_buffer
 from rift_cl.cl.host_arrays import (
@@ -178,7 +178,7 @@ class LinearOperator(ABC):
             self._fill(x, y)
             return y if out is None or y is out else put_inside(self.device, y, out)
         host = as_host_array(x, self.domain, name=name, wants="the operator", dtype=self.dtype)
-        y = np.empty(self.range, self.dtype) if out is None else out
+        y = _empty(self.range, self.dtype) if out is None else out
         y = check_output(y, self.range, self.dtype)
         check_apart(host, y, name=name)
         self._apply_host(host, y)
@@ -350,3 +350,19 @@ class LinearOperator(ABC):
     @abstractmethod
     def _apply_adjoint(self, y: DeviceArray, out: DeviceArray) -> None:
         """Write A' y to ``out``; device arrays with the shapes of a chunk."""
+
+
+def _empty(shape: Shape, dtype: np.dtype[Any]) -> NDArray[Any]:
+    """An array for a result.
+
+    Raises:
+        ResourceLimitError: the host has no memory for it.
+    """
+    try:
+        return np.empty(shape, dtype)
+    except MemoryError as error:
+        raise ResourceLimitError(
+            f"the result of shape {shape} takes {format_bytes(math.prod(shape) * dtype.itemsize)}, "
+            "which the host has not: make the problem smaller, or give a file in memory "
+            "(np.memmap) as out"
+        ) from error

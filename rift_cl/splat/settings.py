@@ -7,7 +7,7 @@ from functools import cache
 from typing import Literal, get_args
 
 from rift_cl.basis.angular import ANGULAR_BASES
-from rift_cl.errors import SettingError
+from rift_cl.errors import SettingError, checked_flag
 from rift_cl.geometry.numbers import one_number
 from rift_cl.option_marks import AutoExpert, Expert, NoOption, Short
 
@@ -66,6 +66,7 @@ class SplatSettings:
 
     def __post_init__(self) -> None:
         """Check every number's range."""
+        _check_flags(self)
         if not one_number(self.near_plane) < one_number(self.far):
             raise SettingError(
                 self,
@@ -143,3 +144,8 @@ class SplatSettings:
 @cache
 def _with_tile(settings: SplatSettings, edge: int) -> SplatSettings:
     return replace(settings, tile=edge)
+
+
+def _check_flags(settings: SplatSettings) -> None:
+    for name in ("antialiased", "absgrad", "smooth_cutoff"):
+        checked_flag("SplatSettings", name, getattr(settings, name))

@@ -14,6 +14,7 @@ from rift_cl.commands.analyze.input import open_sampled
 from rift_cl.commands.analyze.settings import AnalyzeSettings
 from rift_cl.commands.cli import main
 from rift_cl.commands.plan.input import plan_input
+from rift_cl.commands.plan.report import worth_table
 from rift_cl.commands.plan.settings import PlanSettings
 from rift_cl.io import open_volume
 from rift_cl.io.captures.capture import open_capture
@@ -244,3 +245,21 @@ def test_what_makes_no_sense_is_named_and_leaves_nothing(
     error = capsys.readouterr().err
     assert words in error and "Traceback" not in error
     assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize(
+    ("criterion", "mode", "near"),
+    [
+        ("wiener", "volume", "none above 0.5%"),
+        ("logdet", "volume", "none above 1.5%"),
+        ("wiener", "surface", "0.4%"),
+    ],
+)
+def test_gains_that_sampled_frequencies_do_not_tell_are_none(criterion, mode, near):
+    metrics = {
+        "criterion": criterion,
+        "mode": mode,
+        "value": 1.0,
+        "baselines": {"ring": 1.004, "random": 1.25},
+    }
+    assert [row[2] for row in worth_table(metrics)[1]] == ["", near, "20.0%"]

@@ -6,7 +6,14 @@ import numpy as np
 import pytest
 
 import rift_cl as rift
-from rift_cl.errors import DeviceError, DTypeError, NonFiniteError, RiftError, ShapeError
+from rift_cl.errors import (
+    DeviceError,
+    DTypeError,
+    InputError,
+    NonFiniteError,
+    RiftError,
+    ShapeError,
+)
 from rift_cl.reconstruct import FilteredBackprojection
 
 torch = pytest.importorskip("torch", reason="torch is not installed")
@@ -117,6 +124,15 @@ def test_functional_transforms_know_the_operator(device):
     matrix = func.jacrev(lambda x: apply(A, x))(x[0]).reshape(45, 42)
     hessian = func.hessian(lambda x: (apply(A, x) ** 2).sum())(x[0]).reshape(42, 42)
     assert torch.allclose(hessian, 2 * matrix.T @ matrix, atol=1e-4)
+
+
+def test_batches_older_than_torch_func_are_told_what_to_take(device):
+    A, x = projector(device), white(6, 7, requires_grad=True)
+    y, every = apply(A, x), torch.eye(45).reshape(45, 5, 9)
+    with pytest.raises(InputError, match=r"torch\.func"):
+        torch.autograd.grad(y, x, every, is_grads_batched=True)
+    with pytest.raises(InputError, match=r"torch\.func"):
+        torch.autograd.functional.jacobian(lambda x: apply(A, x), x, vectorize=True)
 
 
 def test_filtered_backprojection_trains_what_comes_before_it(device):

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from rift_cl import Fan, Grid, HighPass, Parallel, Projector, Ramp, Response, dot_test, fbp
-from rift_cl.errors import InputError, ShapeError
+from rift_cl.errors import InputError, ResourceLimitError, ShapeError
 from rift_cl.operators import FILTERS, ViewFilter, as_filter, register_filter
 from rift_cl.operators.filters.ramp_filters import WINDOWS, Finer
 from rift_cl.reference import filter_rows, ramp_taps, response_taps, shepp_logan_taps
@@ -268,6 +268,8 @@ def test_responses_that_are_no_finite_numbers_are_refused(function):
         (lambda f: 1 / (1 + f), "times the ramp"),
         (lambda f: -f, "is -1 times the ramp"),
         (np.zeros_like, "keeps 0 % of the ramp"),
+        (lambda f: 2 * f, "is 2 times the ramp"),
+        (lambda f: 0.7 * f * (f < 9), "is 0.7 times the ramp"),
     ],
 )
 def test_responses_that_are_no_ramp_are_doubted(device, function, said):
@@ -286,11 +288,29 @@ def test_a_cone_doubts_responses_as_parallel_beams_do(device):
 
 def test_ramps_of_ones_own_are_not_doubted(device, recwarn):
     A = Projector(Grid((8, 8), 0.01), Parallel(np.arange(6.0), 13, pitch=0.01), device=device)
-    for function in (lambda f: f, lambda f: f * np.cos(f / f.max()), lambda f: 0.7 * f * (f < 9)):
+    for function in (lambda f: f, lambda f: f * np.cos(f / f.max()), lambda f: 1.1 * f * (f < 9)):
         fbp(A, white(6, 13), function)
     fbp(A, white(6, 13), "high-pass")
     fbp(A, white(6, 13), HighPass(0.3))
     assert not [str(each.message) for each in recwarn if "ramp" in str(each.message)]
+
+
+@pytest.mark.parametrize("bins", [16, 91])
+@pytest.mark.parametrize("cutoff", [0.2, 1.0])
+@pytest.mark.parametrize("window", WINDOWS)
+def test_the_windows_as_ones_own_responses_are_not_doubted(window, cutoff, bins):
+    def windowed(f):
+        share = f / f.max() / cutoff
+        return f * WINDOWS[window](share) * (share <= 1)
+
+    assert Response(windowed).doubt(bins, 0.3) is None
+
+
+def test_a_ramp_interpolated_between_its_transformed_samples_is_not_doubted():
+    taps, pitch = ramp_taps(BINS, 0.3), 0.3
+    values = np.abs(np.fft.rfft(taps)) * pitch
+    sampled = np.arange(values.size) / (taps.size * pitch)
+    assert Response(lambda f: np.interp(f, sampled, values)).doubt(BINS, pitch) is None
 
 
 @pytest.mark.parametrize("gains", [[1, 2], np.ones((3, 1)), 1.0])
@@ -309,3 +329,12 @@ def test_gains_must_be_finite(device, bad):
 def test_rows_must_be_there(device, rows):
     with pytest.raises(InputError, match="rows"):
         ViewFilter(Parallel([0.0, 1.0], 5), Ramp(), rows=rows, device=device)
+
+
+def test_detectors_that_the_host_has_no_memory_for_are_refused(monkeypatch):
+    monkeypatch.setattr("rift_cl.cl.budget.host_budget", lambda: 1 << 30)
+    grid, angles, bins = Grid((8, 8)), np.arange(6.0), 2**31
+    with pytest.raises(ResourceLimitError, match="filter of 2147483648 bins"):
+        ViewFilter(Parallel(angles, bins), Ramp())
+    with pytest.raises(ResourceLimitError, match="detector of 2147483648 bins"):
+        Projector(grid, Fan(angles, bins, 1e-9, 100, 200))

@@ -9,7 +9,14 @@ import numpy as np
 import pytest
 
 import rift_cl as rift
-from rift_cl.errors import DeviceMemoryError, DTypeError, InputError, NonFiniteError, ShapeError
+from rift_cl.errors import (
+    DeviceMemoryError,
+    DTypeError,
+    InputError,
+    NonFiniteError,
+    ResourceLimitError,
+    ShapeError,
+)
 from rift_cl.operators import Compensation, HighPass, LinearOperator, Ramp, ViewFilter
 from rift_cl.reconstruct import FilteredBackprojection, MeasuredRays
 from rift_cl.reconstruct.solvers.view_subsets import restricted
@@ -451,3 +458,9 @@ def test_a_function_of_an_operator_cannot_overwrite_what_it_is_applied_to(device
         with pytest.raises(InputError, match=r"writes into its argument.*copy"):
             B(given)
     assert (x == 1).all()
+
+
+def test_a_result_that_the_host_has_no_memory_for_is_refused():
+    A = rift.Projector(rift.Grid((8, 8)), rift.Parallel(np.arange(1 << 19) * 1e-5, 2**31))
+    with pytest.raises(ResourceLimitError, match=r"result of shape .* which the host has not"):
+        A(np.zeros((8, 8), np.float32))

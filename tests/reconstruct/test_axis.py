@@ -131,6 +131,16 @@ def test_half_acquisitions_with_hardly_any_noise_tell_their_axis(noise):
         assert find_center(averaged, FULL).center == pytest.approx(center, abs=0.02)
 
 
+def test_windows_with_nothing_in_them_say_nothing():
+    """A small disc beside the axis: zeros exactly, all about many of the places that are tried."""
+    angles = np.arange(90) * np.pi / 90
+    views = sinogram([(1.0, 12.0, 0.0, 5.0, 5.0, 0.0)], angles, 76.0, bins=91, noise=0)
+    # The axis lies beyond the middle part, where it is looked for.
+    with pytest.raises(InputError, match="no place on the detector"):
+        find_center(views, angles)
+    assert find_center(views, angles, span=(50, 85)).center == pytest.approx(76.0, abs=0.05)
+
+
 @pytest.mark.parametrize("span", [90, 120, 150])
 def test_limited_angles_are_told_by_the_centres_of_mass(span):
     angles = np.deg2rad(np.arange(0, span, 0.5))

@@ -19,6 +19,7 @@ from rift_cl.commands.plan.input import PlanInput
 from rift_cl.report.html_page import Page
 from rift_cl.report.plot import curves, figure_svg
 from rift_cl.sampling.planning.view_plan import DiminishingReturns, Plan
+from rift_cl.sampling.targets.scattered import ACCURACY
 
 # The criterion that is minimized, for people.
 _CRITERIA = {
@@ -76,8 +77,10 @@ def worth_table(metrics: Mapping[str, Any]) -> tuple[tuple[str, ...], list[tuple
         "gain of the plan",
     )
     rows: list[tuple[Any, ...]] = [("planned", _shown(own, kind), "")]
+    # A surface's criterion is not summed over scattered frequencies.
+    told = ACCURACY[kind] if metrics["mode"] == "volume" else 0.0
     for name, value in metrics["baselines"].items():
-        rows.append((_NAMES.get(name, name), _shown(value, kind), _against(value, own)))
+        rows.append((_NAMES.get(name, name), _shown(value, kind), _against(value, own, told)))
     return columns, rows
 
 
@@ -109,9 +112,10 @@ def bound_words(metrics: Mapping[str, Any]) -> str:
     )
 
 
-def _against(value: float, own: float) -> str:
-    """By which fraction the plan is below a value, as ``Plan.gain`` has it."""
-    return f"{(value - own) / max(abs(value), 1e-300):.1%}"
+def _against(value: float, own: float, told: float) -> str:
+    """By which fraction the plan is below a value (``Plan.gain``), if by more than is told."""
+    gain = (value - own) / max(abs(value), 1e-300)
+    return f"none above {told:.1%}" if abs(gain) < told else f"{gain:.1%}"
 
 
 def _assumed(page: Page, given: PlanInput) -> None:

@@ -13,7 +13,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any, get_args
 
-from rift_cl.errors import FileFormatError, InputError
+from rift_cl.errors import FileFormatError, InputError, checked_flag
 from rift_cl.io.boundary import reading
 from rift_cl.io.npy_file import SIGNATURE
 from rift_cl.io.scans.beam_file import DESCRIPTIONS, projections_of
@@ -194,9 +194,9 @@ def open_scan(
         kind=_one_of("kind", kind, get_args(Kind)),
         axes=axes,
         angle_unit=_one_of("angle_unit", angle_unit, get_args(AngleUnit)),
-        values=values,
+        values=checked_flag("open_scan", "values", values),
         geometry=None if geometry is None else os.fspath(geometry),
-        reversed=reversed,
+        reversed=checked_flag("open_scan", "reversed", reversed),
         repeat=repeat,
     )
     if path.suffix.lower() in DESCRIPTIONS and path.is_file():

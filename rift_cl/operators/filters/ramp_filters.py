@@ -23,7 +23,7 @@ import numpy as np
 from numpy.typing import ArrayLike, DTypeLike, NDArray
 
 from rift_cl.cl.array import DeviceArray
-from rift_cl.cl.budget import check_array, cut_evenly, plan_chunks
+from rift_cl.cl.budget import check_array, check_host, cut_evenly, plan_chunks
 from rift_cl.cl.device import Device
 from rift_cl.cl.discovery import default_device
 from rift_cl.cl.host_arrays import check_finite
@@ -48,9 +48,13 @@ WINDOWS: dict[str, Callable[[Floats], Floats]] = {
 HIGH_PASS = "high-pass"
 # A response that is no ramp is sampled this many times finer than the detector can tell apart.
 _OVERSAMPLING = 16
+# What the design of a filter takes on the host for each bin: some arrays four times as long.
+_HOST_BYTES = 128
 # A response that keeps less than such a part of the ramp, or differs from it by more than such a
-# factor where both begin, is hardly meant so.
-_LEAST_OF_RAMP, _LEVEL = 1e-3, 2.0
+# factor where both begin, is hardly meant so. Factors that come of another convention (2, pi / 2,
+# the root of 2) are greater; less are windows that end low, and a ramp whose exact samples were
+# transformed and interpolated, 1.18 times the ramp between zero and the first frequency.
+_LEAST_OF_RAMP, _LEVEL = 1e-3, 1.25
 
 
 @runtime_checkable
@@ -313,6 +317,7 @@ class ViewFilter(LinearOperator):
         super().__init__(shape, shape, device or default_device(), dtype)
         if rows is not None and rows < 1:
             raise ShapeError(f"rows is {rows}, wanted at least 1 detector row")
+        check_host(_HOST_BYTES * scan.bins, what=f"a filter of {scan.bins} bins")
         self.filter = filter
         self._views, self._rows, self._given_gains = scan, rows, gains
         self._factors, self._taps = _factors_and_taps(scan, filter, gains)

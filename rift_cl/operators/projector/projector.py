@@ -12,12 +12,16 @@ from typing import TYPE_CHECKING, Any, overload
 from numpy.typing import DTypeLike
 
 from rift_cl.cl.array import DeviceArray
+from rift_cl.cl.budget import check_host
 from rift_cl.cl.device import Device
 from rift_cl.geometry import Cone, Fan, Grid, Parallel, Vectors
 from rift_cl.operators.linear import LinearOperator
 
 if TYPE_CHECKING:
     from rift_cl.operators.projector.parallel.phase_projector import PhaseProjector
+
+# What the rays from a point take on the host for each bin of a view, at least.
+_HOST_BYTES = 64
 
 
 class Projector(LinearOperator):
@@ -79,6 +83,8 @@ class Projector(LinearOperator):
 
 
 def _kind(grid: Grid, scan: Any) -> type[Projector]:
+    if isinstance(scan, Fan | Cone | Vectors):
+        check_host(_HOST_BYTES * scan.bins, what=f"a detector of {scan.bins} bins")
     if isinstance(scan, Fan) and isinstance(grid, Grid) and len(grid.shape) == 2:
         from rift_cl.operators.projector.fan.fan_projector import FanProjector
 

@@ -43,6 +43,9 @@ def wedge_evidence(row: Row, window: float, near: float | None) -> Evidence:
         row: views spread evenly over half a turn, its end left out.
         window: centre, in bins of the row, of the part of the detector that is looked at.
         near: the centre as far as it is known, in bins of the row; None where it is not.
+
+    Returns:
+        The evidence; it says nothing (all of its terms are 0) where the window holds nothing.
     """
     from scipy.fft import fft
     from scipy.ndimage import uniform_filter
@@ -58,6 +61,8 @@ def wedge_evidence(row: Row, window: float, near: float | None) -> Evidence:
         whole = np.abs(forth + sign * half.turned(near) * back.conj()) ** 2
         known = np.exp(-2 * (half.frequencies * _DOUBT) ** 2).astype(np.float32)
         energy = known * whole + (1 - known) * energy
+    if not energy.max() > 0:
+        return half.evidence(np.zeros(half.frequencies.size, np.complex128), row, _FREEDOM)
     mean = uniform_filter(energy, _BOX, mode="nearest")
     noise = _noise(energy)
     weights = 1 / np.where(mean < _NOISE * noise, noise, mean)

@@ -288,7 +288,11 @@ def _peaks(centers: Floats, scores: Floats, apart: float) -> Floats:
 
 
 def _followed(row: Row, look: Look, start: float, by: str) -> RowAxis:
-    """The centre that a place leads to, with the window and the noise taken about it."""
+    """The centre that a place leads to, with the window and the noise taken about it.
+
+    Where there is nothing in the window the place leads nowhere: its score is 0, and the error of
+    its centre infinite.
+    """
     center, last = start, 0.0
     trials = [
         row.bin * np.arange(-reach, reach + step / 2, step)
@@ -296,6 +300,8 @@ def _followed(row: Row, look: Look, start: float, by: str) -> RowAxis:
     ]
     for _ in range(_ROUNDS):
         told = look(row.place(center), row.place(center))
+        if told.most == 0:
+            break
         best = center
         for trial in trials:
             best += float(trial[told.scores(best + trial).argmax()])

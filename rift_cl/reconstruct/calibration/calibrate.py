@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from rift_cl.cl.device import Device
 from rift_cl.cl.host_arrays import as_host_array
+from rift_cl.errors import checked_flag
 from rift_cl.geometry import Cone, Fan, Vectors
 from rift_cl.reconstruct.axis import AxisEstimate, axis_of_scan
 from rift_cl.reconstruct.calibration.opposite_fit import fit_opposite_rays
@@ -139,6 +140,8 @@ def calibrate(
         ShapeError: the projections do not fit the scan.
         NonFiniteError: a sample is not finite.
     """
+    checked_flag("calibrate", "distance", distance)
+    checked_flag("calibrate", "orbit", orbit)
     axis = axis_of_scan(projections, scan, wants="calibrate")
     sign = -1.0 if axis.sense is not None and axis.sense.sign < 0 else 1.0
     right: Fan | Cone

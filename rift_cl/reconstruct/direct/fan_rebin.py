@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rift_cl.cl.host_arrays import check_finite
-from rift_cl.errors import InputError, ShapeError
+from rift_cl.errors import InputError, ShapeError, checked_flag
 from rift_cl.geometry import Parallel
 from rift_cl.geometry.fan import FanBeam
 from rift_cl.reconstruct.direct.turn_views import (
@@ -66,6 +66,7 @@ def rebin_fan(
         ShapeError: the arrays do not fit each other.
         InputError: the interpolation is unknown, or no parallel view is covered.
     """
+    checked_flag("rebin_fan", "whole", whole)
     stack = np.asarray(projections, np.float32)
     if stack.ndim not in (2, 3) or stack.shape[0] != np.size(angles):
         raise ShapeError(

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from rift_cl.cl.device import Device
 from rift_cl.cl.discovery import open_device
-from rift_cl.errors import InputError, ShapeError
+from rift_cl.errors import InputError, ShapeError, checked_flag
 from rift_cl.geometry import Parallel
 from rift_cl.reconstruct.direct.offset_axis import is_full_turn, offset_weights
 from rift_cl.reconstruct.preprocess.sinc_interpolation import resampled
@@ -61,6 +61,7 @@ def stitched(
             f"projections have shape {stack.shape}, wanted ({len(scan.angles)}, {scan.bins}) or "
             f"({len(scan.angles)}, row, {scan.bins})"
         )
+    checked_flag("stitched", "level", level)
     if not is_full_turn(scan.angles):
         raise InputError("the views are no full turn: only opposite views can be joined")
     weights = (offset_weights(scan) / 2).astype(np.float32)

@@ -24,7 +24,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rift_cl.errors import InputError, ShapeError
+from rift_cl.errors import InputError, ShapeError, checked_flag
 from rift_cl.reconstruct.preprocess.projection_array import as_projections
 
 Floats = NDArray[np.float32]
@@ -72,6 +72,7 @@ class Propagation:
 
     def __post_init__(self) -> None:
         """Check the numbers."""
+        checked_flag("phase retrieval", "generalised", self.generalised)
         units = {"pixel": "metres", "distance": "metres", "energy": "keV", "delta_beta": "no unit"}
         for name, unit in units.items():
             value = getattr(self, name)

@@ -27,7 +27,7 @@ from numpy.typing import NDArray
 
 from rift_cl.cl.device import Device
 from rift_cl.cl.discovery import default_device
-from rift_cl.errors import InputError
+from rift_cl.errors import InputError, checked_flag
 from rift_cl.reconstruct.preprocess.columns import FEWEST_VIEWS, DetectorColumns, mend_columns
 from rift_cl.reconstruct.preprocess.projection_array import as_projections
 from rift_cl.reconstruct.preprocess.stripe_detection import (
@@ -114,6 +114,7 @@ class LargeStripes:
     def __post_init__(self) -> None:
         """Check the ratio."""
         _demand_above(1, ratio=self.ratio)
+        checked_flag("LargeStripes", "normalise", self.normalise)
 
     def __call__(self, stack: Floats, device: Device) -> Floats:
         """Filter projections (view, row, bin)."""
@@ -179,6 +180,7 @@ class CombinedFilter:
         """Check the options."""
         SortingFilter(self.window)
         _demand_above(1, large_ratio=self.large_ratio, dead_ratio=self.dead_ratio)
+        checked_flag("CombinedFilter", "normalise", self.normalise)
 
     def __call__(self, stack: Floats, device: Device) -> Floats:
         """Filter projections (view, row, bin)."""

@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from rift_cl.cl.budget import plan_chunks
 from rift_cl.cl.device import Device
 from rift_cl.cl.discovery import default_device
-from rift_cl.errors import InputError
+from rift_cl.errors import InputError, checked_flag
 from rift_cl.reconstruct.preprocess.columns import FEWEST_VIEWS, DetectorColumns
 from rift_cl.reconstruct.preprocess.projection_array import as_projections
 
@@ -86,7 +86,7 @@ def remove_zingers(
     """
     _check_options(sigma, excess, size, kind)
     values = as_projections(stack, name="stack")
-    rule = _Rule(sigma, excess, size, dark)
+    rule = _Rule(sigma, excess, size, checked_flag("remove_zingers", "dark", dark))
     projections = values if values.ndim == 3 else values[:, None]
     if kind == "attenuation":
         light = np.exp(-np.clip(projections, -_OPAQUE, _OPAQUE))

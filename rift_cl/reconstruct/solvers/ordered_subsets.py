@@ -27,7 +27,7 @@ from rift_cl.cl.arithmetic import axpby
 from rift_cl.cl.elementwise import clip_negative, copy, multiply
 from rift_cl.cl.passing_parts import runs
 from rift_cl.cl.reductions import dot
-from rift_cl.errors import InputError, NonFiniteError
+from rift_cl.errors import InputError, NonFiniteError, checked_flag
 from rift_cl.geometry.numbers import one_number
 from rift_cl.operators.linear import LinearOperator
 from rift_cl.reconstruct.solvers.data_term import DataTerm
@@ -95,6 +95,7 @@ class OrderedSubsets(Solver):
     ) -> None:
         if not 0 < one_number(relaxation) < 2:
             raise InputError(f"relaxation is {relaxation!r}, wanted a number between 0 and 2")
+        self._nonnegative = checked_flag("sirt", "nonnegative", nonnegative)
         data = DataTerm(A, y, None, noise, self.arrays, weights)
         super().__init__(data, noise)
         count, most = one_number(subsets), A.range[0]
@@ -102,13 +103,13 @@ class OrderedSubsets(Solver):
             raise InputError(
                 f"subsets is {subsets!r}, wanted a whole number from 1 to the {most} views"
             )
-        self._nonnegative, self._length = bool(nonnegative), float(relaxation)
+        self._length = float(relaxation)
         whole = data.home.host(data.y)
         chosen = view_subsets(data.A, int(count))
         self._subsets = [self._subset(views, whole, weights is None) for views in chosen]
         self._pixels = self._inverse_columns(weights is None)
         image = data.start(start)
-        if nonnegative:
+        if self._nonnegative:
             clip_negative(data.device, image)
         self._now = SolverState(image, data.data(), 0, 0.0)
         self._change = data.image()

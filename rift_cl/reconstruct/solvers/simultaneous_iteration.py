@@ -30,7 +30,7 @@ from rift_cl.cl.arithmetic import axpby
 from rift_cl.cl.array_home import ArrayHome
 from rift_cl.cl.elementwise import clip_negative, copy, multiply
 from rift_cl.cl.passing_parts import runs
-from rift_cl.errors import InputError
+from rift_cl.errors import InputError, checked_flag
 from rift_cl.geometry.numbers import one_number
 from rift_cl.operators.linear import LinearOperator
 from rift_cl.reconstruct.solvers.data_term import DataTerm
@@ -82,9 +82,9 @@ class Sirt(Solver):
     ) -> None:
         if not 0 < one_number(relaxation) < 2:
             raise InputError(f"relaxation is {relaxation!r}, wanted a number between 0 and 2")
+        self._nonnegative = checked_flag("sirt", "nonnegative", nonnegative)
         data = DataTerm(A, y, precondition, noise, self.arrays, weights)
         super().__init__(data, noise)
-        self._nonnegative = nonnegative
         self._rays, self._pixels, self._length = None, None, float(relaxation)
         if data.weight is None and weights is None:
             self._rays, self._pixels = (inverse_sums(B, data.home) for B in (A, A.T))
@@ -94,7 +94,7 @@ class Sirt(Solver):
             largest = data.norm_squared()
             self._length = relaxation / largest if largest > 0 else 0.0
         image, residual = data.start(start), data.data()
-        if nonnegative:
+        if self._nonnegative:
             clip_negative(data.device, image)
         weighted = None if data.weight is None else data.data()
         self._now = _State(image, residual, 0, 0.0, weighted, 0.0)

@@ -17,7 +17,7 @@ from typing import Any
 
 from rift_cl.cl.elementwise import clip_negative
 from rift_cl.cl.reductions import dot
-from rift_cl.errors import InputError
+from rift_cl.errors import InputError, checked_flag
 from rift_cl.geometry.numbers import one_number
 from rift_cl.operators.linear import LinearOperator
 from rift_cl.reconstruct.solvers.data_term import DataTerm
@@ -61,9 +61,10 @@ class VariationSolver(Solver):
     ) -> None:
         if not one_number(weight) >= 0:
             raise InputError(f"weight is {weight!r}, wanted a number, 0 or more")
+        self._nonnegative = checked_flag("tv", "nonnegative", nonnegative)
         data = DataTerm(A, y, precondition, noise, self.arrays, weights)
         super().__init__(data, noise)
-        self._weight, self._nonnegative = float(weight), bool(nonnegative)
+        self._weight = float(weight)
         # What the variation counts beside data of these weights, whatever their scale.
         self._strength = self._weight * data.mean_weight
         spacing = (1.0,) * len(A.domain) if A.grid is None else A.grid.spacing

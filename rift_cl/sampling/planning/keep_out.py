@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from rift_cl.errors import InputError
+from rift_cl.errors import InputError, checked_flag
 from rift_cl.geometry.numbers import one_number, real_numbers
 from rift_cl.sampling.planning.out_of_sight import OutOfSight
 
@@ -147,6 +147,7 @@ class KeepOut:
 
     def __post_init__(self) -> None:
         """Check the kind of the shape."""
+        checked_flag("KeepOut", "hides", self.hides)
         if isinstance(self.shape, OutOfSight) and self.hides:
             raise InputError("KeepOut: OutOfSight has no surface that could hide a target")
         if not isinstance(self.shape, Sphere | Box | Cone | OutOfSight):

@@ -10,7 +10,7 @@ from typing import Literal, get_args
 import numpy as np
 from numpy.typing import NDArray
 
-from rift_cl.errors import InputError, check_type
+from rift_cl.errors import InputError, check_type, checked_flag
 from rift_cl.geometry import Camera
 from rift_cl.geometry.camera_type import CameraType
 from rift_cl.geometry.numbers import one_number
@@ -94,6 +94,7 @@ def plan(
     check_type("plan", "constraints", limits, Constraints)
     check_type("plan", "cameras", cameras, Sequence)
     check_type("plan", "seed", seed, Integral)
+    checked_flag("plan", "compare", compare)
     target = looked_at(target, limits)
     fine = for_planning(target, most_candidates(int(views)))
     design = DesignSpace(fine, limits, tuple(cameras) or default_types(target))

@@ -9,7 +9,7 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass
 
-from rift_cl.errors import InputError
+from rift_cl.errors import InputError, checked_flag
 from rift_cl.registry import Registry
 
 _SPACE, _WORD, _SIGNS = re.compile(r"\s+"), re.compile(r"\w"), "+-&|<>=!*/"
@@ -40,6 +40,7 @@ class PixelLoss:
 
     def __post_init__(self) -> None:
         """Check both expressions."""
+        checked_flag("PixelLoss", "surrogate", self.surrogate)
         for name in ("value", "gradient"):
             given = getattr(self, name)
             if not isinstance(given, str) or not given.strip():

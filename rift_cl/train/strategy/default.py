@@ -24,7 +24,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from rift_cl.errors import SettingError
+from rift_cl.errors import SettingError, checked_flag
 from rift_cl.option_marks import Auto
 from rift_cl.train.per_view.quaternions import rotated
 from rift_cl.train.ranges import check_number, check_whole
@@ -86,6 +86,8 @@ class DefaultSettings(StrategySettings):
 
     def __post_init__(self) -> None:
         """Check every number's range."""
+        for name in ("absgrad", "revised_opacity"):
+            checked_flag("DefaultSettings", name, getattr(self, name))
         for name in ("every", "min_reset"):
             check_whole(self, name, 1)
         for name in ("first", "last", "reset"):

@@ -16,7 +16,7 @@ from typing import NamedTuple
 from rift_cl.cl.budget import format_bytes
 from rift_cl.cl.device import Device
 from rift_cl.cl.discovery import default_device
-from rift_cl.errors import InputError, check_type
+from rift_cl.errors import InputError, check_type, checked_flag
 from rift_cl.geometry import Grid, Parallel
 from rift_cl.operators.projector.parallel.fast_projector import FastProjector
 from rift_cl.operators.projector.parallel.parallel_projector import ParallelProjector
@@ -95,6 +95,7 @@ def cheapest_projector(
         )
     device = device or default_device()
     check_type("cheapest_projector", "grid", grid, Grid)
+    checked_flag("cheapest_projector", "iterative", iterative)
     check_type("cheapest_projector", "device", device, Device)
     if footprint is not None:
         return PhaseProjector(grid, scan, footprint, device=device)
