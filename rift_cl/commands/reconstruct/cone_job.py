@@ -13,7 +13,7 @@ import dataclasses
 import time
 from collections.abc import Callable, Generator, Iterable, Iterator, Mapping
 from contextlib import suppress
-from typing import Any, TypeAlias
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -40,6 +40,7 @@ from rift_cl.commands.reconstruct.report import (
     voxel,
 )
 from rift_cl.commands.reconstruct.settings import ReconstructSettings
+from rift_cl.commands.reconstruct.spread import begun_workers, spread
 from rift_cl.commands.reconstruct.volume import (
     chosen_window,
     clipped_words,
@@ -67,6 +68,10 @@ from rift_cl.reconstruct.direct.redundancy import ITERATE
 from rift_cl.reconstruct.solvers.tv_problem import VariationSolver
 from rift_cl.report.html_page import Page
 from rift_cl.report.plot import figure_png, image_grid
+
+if TYPE_CHECKING:
+    from rift_cl.cluster.beside import Beside
+    from rift_cl.cluster.workers import Workers
 
 Floats = NDArray[np.float32]
 Formula: TypeAlias = "FDK | Katsevich | Backprojection"
@@ -255,42 +260,43 @@ class ConeReconstruction:
             yield Report(0, total, "steps")
         elif not self.settings.resume:
             yield self.report(0)
-        if in_slabs and self._goes_on:
-            self.source.take(self.kept.axis())
-        # What is assumed of the file is told first: where no axis is found, it may be why.
-        of_file = len(self.source.notes)
-        for note in self.source.notes:
-            self.announce(note)
-        self._locate()
-        if in_slabs and self._goes_on:
-            self.kept.go_on(self._facts())
-            self._gone_on = True
-        for note in self.source.notes[of_file:]:
-            self.announce(note)
-        self.folder.make()
-        try:
-            if self.settings.preview:
-                self._show(self._preview())
-                self.folder.release()
-                yield Report(total, total, "steps")
-                return
-            self._check_place()
-            if in_slabs:
-                yield from self._keep_slabs()
-                self._finish(None)
-                return
-            integrals = self._read()
-            self._count(dead_pixels=integrals.dead, starved_samples=integrals.starved)
-            yield Report(1, total, "steps")
-            slabs = yield from self._solve(integrals.projections, total)
-            self._finish(slabs)
-        except BaseException as error:
-            if not self._keep_what_is_done():
-                self.folder.discard()
-            elif isinstance(error, KeyboardInterrupt):
-                raise stopped(self.kept) from None
-            raise
-        yield Report(total, total, "steps")
+        with begun_workers(self) as workers:
+            if in_slabs and self._goes_on:
+                self.source.take(self.kept.axis())
+            # What is assumed of the file is told first: where no axis is found, it may be why.
+            of_file = len(self.source.notes)
+            for note in self.source.notes:
+                self.announce(note)
+            self._locate()
+            if in_slabs and self._goes_on:
+                self.kept.go_on(self._facts())
+                self._gone_on = True
+            for note in self.source.notes[of_file:]:
+                self.announce(note)
+            self.folder.make()
+            try:
+                if self.settings.preview:
+                    self._show(self._preview())
+                    self.folder.release()
+                    yield Report(total, total, "steps")
+                    return
+                self._check_place()
+                if in_slabs:
+                    yield from self._keep_slabs(workers)
+                    self._finish(None)
+                    return
+                integrals = self._read()
+                self._count(dead_pixels=integrals.dead, starved_samples=integrals.starved)
+                yield Report(1, total, "steps")
+                slabs = yield from self._solve(integrals.projections, total)
+                self._finish(slabs)
+            except BaseException as error:
+                if not self._keep_what_is_done():
+                    self.folder.discard()
+                elif isinstance(error, KeyboardInterrupt):
+                    raise stopped(self.kept) from None
+                raise
+            yield Report(total, total, "steps")
 
     @property
     def _goes_on(self) -> bool:
@@ -320,19 +326,16 @@ class ConeReconstruction:
         self._locate()
         self.kept.go_on(self._facts(), names)
 
-    def _keep_slabs(self) -> Iterator[Report]:
+    def _keep_slabs(self, workers: Beside[Workers] | None) -> Iterator[Report]:
         """Make all slices that are missing, and keep them."""
         self._check_sides(self._slabs.few_rows())
         self.source.clean.zingers = 0
         if not self._gone_on:
             self.kept.begin(self._facts())
-        if self.settings.cluster is None:
+        if workers is None:
             yield from self.work_on(self.kept.missing())
             return
-        # Imported when used: a worker imports this module.
-        from rift_cl.commands.reconstruct.spread import spread
-
-        yield from spread(self)
+        yield from spread(self, workers)
 
     def work_on(self, runs: list[slice]) -> Iterator[Report]:
         """Make and keep runs of slices; a report after each part that found room."""

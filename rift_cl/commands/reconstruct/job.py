@@ -12,7 +12,7 @@ import time
 from collections.abc import Callable, Generator, Iterator, Mapping
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -39,6 +39,7 @@ from rift_cl.commands.reconstruct.report import (
 )
 from rift_cl.commands.reconstruct.settings import ReconstructSettings
 from rift_cl.commands.reconstruct.slice_input import SliceInput
+from rift_cl.commands.reconstruct.spread import begun_workers, spread
 from rift_cl.commands.reconstruct.volume import (
     check_place,
     chosen_window,
@@ -51,6 +52,10 @@ from rift_cl.io.scans.scan_file import ScanFile
 from rift_cl.io.volumes import VOLUME_NAMES
 from rift_cl.progress import Report
 from rift_cl.reconstruct import Attenuation
+
+if TYPE_CHECKING:
+    from rift_cl.cluster.beside import Beside
+    from rift_cl.cluster.workers import Workers
 
 # Slices from which a run by a formula is worth a look before it goes on.
 _PREVIEW_FROM = 8
@@ -143,25 +148,26 @@ class Reconstruction:
             return
         if not self.settings.resume:
             yield Report(0, self._total, self._what)
-        self._settle()
-        self.folder.make()
-        try:
-            if self.settings.preview:
-                yield from self._look()
-                self.folder.release()
-                return
-            check_place(self.settings, self.source, self.inversion.window)
-            if not self._gone_on:
-                self._ours = True
-                self.kept.begin(self._facts(), self.inversion.projection)
-            yield from self._work()
-        except BaseException as error:
-            if not self._keep_what_is_done():
-                self.folder.discard()
-            elif isinstance(error, KeyboardInterrupt):
-                raise stopped(self.kept) from None
-            raise
-        self._finish()
+        with begun_workers(self) as workers:
+            self._settle()
+            self.folder.make()
+            try:
+                if self.settings.preview:
+                    yield from self._look()
+                    self.folder.release()
+                    return
+                check_place(self.settings, self.source, self.inversion.window)
+                if not self._gone_on:
+                    self._ours = True
+                    self.kept.begin(self._facts(), self.inversion.projection)
+                yield from self._work(workers)
+            except BaseException as error:
+                if not self._keep_what_is_done():
+                    self.folder.discard()
+                elif isinstance(error, KeyboardInterrupt):
+                    raise stopped(self.kept) from None
+                raise
+            self._finish()
 
     def _settle(self) -> None:
         """Find the axis, and whether there is something to go on with; nothing is written.
@@ -200,7 +206,8 @@ class Reconstruction:
             CheckpointError: the run is not this one.
         """
         self._take_found()
-        self._locate()
+        # That process has told its doubts.
+        self._locate(doubt=False)
         self.kept.go_on(self._facts(), names)
         self.kept.shape = self.shape
 
@@ -214,11 +221,11 @@ class Reconstruction:
         if axis is not None:
             self.source.center, self.source.tilt, self.source.turned = axis
 
-    def _locate(self) -> None:
+    def _locate(self, *, doubt: bool = True) -> None:
         """Find the axis, and tell before any other work, this search too, that memory is short."""
         if not self.source.settled:
             self.inversion.check_memory()
-        self.source.locate()
+        self.source.locate(doubt=doubt)
         self.inversion.slabs([slice(0, 1)])
 
     @cached_property
@@ -257,22 +264,19 @@ class Reconstruction:
         count = self.shape[0]
         return count >= _PREVIEW_FROM or (self.settings.iterative and count > 1)
 
-    def _work(self) -> Iterator[Report]:
+    def _work(self, workers: Beside[Workers] | None) -> Iterator[Report]:
         """Every slice that is missing; first, of a long run, the middle one to look at."""
         # Less those of the row that the axis was looked for in.
         self.source.clean.zingers = 0
-        if not self._gone_on and self._looks_first and self.settings.cluster is None:
+        if not self._gone_on and self._looks_first and workers is None:
             yield from self._look()
         if self._gone_on:
             # Where it goes on, so that nobody takes what was done before for this run's pace.
             yield self.report(self.kept.done)
-        if self.settings.cluster is None:
+        if workers is None:
             yield from self.work_on(self.kept.missing())
             return
-        # Imported when used: a worker imports this module.
-        from rift_cl.commands.reconstruct.spread import spread
-
-        yield from spread(self)
+        yield from spread(self, workers)
 
     def work_on(self, runs: list[slice]) -> Iterator[Report]:
         """Reconstruct and keep runs of slices, a slab at a time; a report after each."""

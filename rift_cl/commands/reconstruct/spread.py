@@ -10,18 +10,20 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
 
 from rift_cl.cluster.address import ClusterAddress
+from rift_cl.cluster.beside import Beside
 from rift_cl.cluster.on_worker import token
-from rift_cl.cluster.workers import Task, cluster_workers
 from rift_cl.commands.options import absolute_files
 from rift_cl.commands.reconstruct.settings import ReconstructSettings
 from rift_cl.progress import Report
 
 if TYPE_CHECKING:
+    from rift_cl.cluster.workers import Task, Workers
     from rift_cl.commands.reconstruct.cone_job import ConeReconstruction
     from rift_cl.commands.reconstruct.job import Reconstruction
 
@@ -47,36 +49,53 @@ class Receipt(NamedTuple):
     device: str
 
 
-def spread(job: Run) -> Iterator[Report]:
+@contextmanager
+def begun_workers(job: Run) -> Iterator[Beside[Workers] | None]:
+    """The workers that a run asks for, which begin while it is got ready; None where it asks none.
+
+    They end while whoever has done with them goes on.
+    """
+    settings = job.settings
+    if settings.cluster is None or settings.preview:
+        yield None
+        return
+    # Imported when used: most runs do without.
+    from rift_cl.cluster.workers import cluster_workers, quiet_dask
+
+    given = settings.cluster, job.device, settings.device, settings.part_timeout
+    with quiet_dask(), Beside(cluster_workers(*given)) as begun:
+        yield begun
+
+
+def spread(job: Run, begun: Beside[Workers]) -> Iterator[Report]:
     """Have the missing slices of a run that has begun made by workers; a report now and then.
 
     Raises:
         RiftError: a worker cannot do it; what is done is kept.
     """
-    settings, kept = job.settings, job.kept
-    assert settings.cluster is not None
-    given = settings.cluster, job.device, settings.device, settings.part_timeout
-    with cluster_workers(*given) as workers:
-        job.announce(workers.sentence)
-        theirs, names = _of_workers(settings)
-        run = kept.mark()
-        with token(kept.path) as seen:
-            workers.check([theirs.out, *_files(theirs), seen])
-        runs = _runs(kept.missing(), len(workers), job.block)
-        tasks = (_task(wanted, theirs, names, run) for wanted in runs)
-        used: set[str] = set()
-        done, lost = -1, 0
-        for come in workers.each(make_slices, tasks):
-            if come is not None:
-                used.add(come[1].device)
-                job.take(*come[1][:3])
-            if workers.lost > lost:
-                lost = workers.lost
-                job.announce("a worker was lost: its slices go to another")
-            if kept.done > done:
-                done = kept.done
-                yield job.report(done, {"workers": len(workers)})
+    kept, workers = job.kept, begun.get()
+    workers.wait()
+    job.announce(workers.sentence)
+    theirs, names = _of_workers(job.settings)
+    run = kept.mark()
+    with token(kept.path) as seen:
+        workers.check([theirs.out, *_files(theirs), seen])
+    runs = _runs(kept.missing(), len(workers), job.block)
+    tasks = (_task(wanted, theirs, names, run) for wanted in runs)
+    used: set[str] = set()
+    done, lost = -1, 0
+    for come in workers.each(make_slices, tasks):
+        if come is not None:
+            used.add(come[1].device)
+            job.take(*come[1][:3])
+        if workers.lost > lost:
+            lost = workers.lost
+            job.announce("a worker was lost: its slices go to another")
+        if kept.done > done:
+            done = kept.done
+            yield job.report(done, {"workers": len(workers)})
     job.metrics["workers"] = len(workers)
+    begun.leave()
     if len(used) > 1:
         job.source.notes.append(
             f"Slices were made on {len(used)} kinds of devices, which may round differently: "
@@ -101,6 +120,8 @@ def _runs(missing: list[slice], workers: int, block: int) -> Iterator[slice]:
 
 
 def _task(wanted: slice, settings: ReconstructSettings, names: Mapping[str, str], run: str) -> Task:
+    from rift_cl.cluster.workers import Task
+
     given = settings, tuple(names.items()), run, wanted.start, wanted.stop
     return Task(f"slices {wanted.start} to {wanted.stop}", given, wanted.stop - wanted.start)
 
