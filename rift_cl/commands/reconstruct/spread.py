@@ -9,6 +9,7 @@ either way, to the same bits.
 from __future__ import annotations
 
 import dataclasses
+import math
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from functools import lru_cache
@@ -19,7 +20,11 @@ from rift_cl.cluster.address import ClusterAddress
 from rift_cl.cluster.beside import Beside
 from rift_cl.cluster.on_worker import token
 from rift_cl.commands.options import absolute_files
+from rift_cl.commands.reconstruct.assembly import Assembly
+from rift_cl.commands.reconstruct.overlap import Behind
 from rift_cl.commands.reconstruct.settings import ReconstructSettings
+from rift_cl.commands.reconstruct.slice_window import cut_evenly
+from rift_cl.io.volumes.layout import PART
 from rift_cl.progress import Report
 
 if TYPE_CHECKING:
@@ -67,8 +72,10 @@ def begun_workers(job: Run) -> Iterator[Beside[Workers] | None]:
         yield begun
 
 
-def spread(job: Run, begun: Beside[Workers]) -> Iterator[Report]:
+def spread(job: Run, begun: Beside[Workers], assembly: Assembly) -> Iterator[Report]:
     """Have the missing slices of a run that has begun made by workers; a report now and then.
+
+    What they have kept goes into the volume while they go on.
 
     Raises:
         RiftError: a worker cannot do it; what is done is kept.
@@ -84,18 +91,20 @@ def spread(job: Run, begun: Beside[Workers]) -> Iterator[Report]:
     tasks = (_task(wanted, theirs, names, run) for wanted in runs)
     used: set[str] = set()
     done, lost = -1, 0
-    for come in workers.each(make_slices, tasks):
-        if come is not None:
-            used.add(come[1].device)
-            job.take(*come[1][:3])
-        if workers.lost > lost:
-            lost = workers.lost
-            job.announce("a worker was lost: its slices go to another")
-        if kept.done > done:
-            done = kept.done
-            yield job.report(done, {"workers": len(workers)})
+    with Behind() as behind:
+        for come in workers.each(make_slices, tasks):
+            if come is not None:
+                used.add(come[1].device)
+                job.take(*come[1][:3])
+            if workers.lost > lost:
+                lost = workers.lost
+                job.announce("a worker was lost: its slices go to another")
+            behind.offer(assembly.catch_up)
+            if kept.done > done:
+                done = kept.done
+                yield job.report(done, {"workers": len(workers)})
+        begun.leave()
     job.metrics["workers"] = len(workers)
-    begun.leave()
     if len(used) > 1:
         job.source.notes.append(
             f"Slices were made on {len(used)} kinds of devices, which may round differently: "
@@ -113,10 +122,11 @@ def _runs(missing: list[slice], workers: int, block: int) -> Iterator[slice]:
     """
     count = sum(wanted.stop - wanted.start for wanted in missing)
     each = max(1, min(_MOST, -(-count // (_SHARES * workers))))
+    if each > PART:
+        block = math.lcm(block, PART)
     each = -(-each // block) * block
     for wanted in missing:
-        for first in range(wanted.start, wanted.stop, each):
-            yield slice(first, min(first + each, wanted.stop))
+        yield from cut_evenly(wanted, each)
 
 
 def _task(wanted: slice, settings: ReconstructSettings, names: Mapping[str, str], run: str) -> Task:
@@ -171,7 +181,7 @@ def make_slices(
     job = _joined(settings, names, run)
     job.metrics, job.source.clean.zingers = {}, 0
     job.inversion.residuals.clear()
-    for _ in job.work_on([slice(first, stop)]):
+    for _ in job.work_on([slice(first, stop)], job.kept.save):
         pass
     device = f"{job.device.name} ({job.device.platform} {job.device.driver})"
     residuals = dict(job.inversion.residuals)
