@@ -54,9 +54,9 @@ class Preview:
         """The middle slice, once it has passed."""
         self.frames: dict[int, NDArray[np.float32]] = {}
         """More of them, made smaller, for the slider through z."""
-        self.upright: dict[int, dict[int, NDArray[np.float32]]] = {}
-        """Planes along the axis, for the slider through y: by its number a row of every slice, made
-        smaller, by the slice's."""
+        # Of planes along the axis, for the slider through y, a row of every slice, made smaller: by
+        # the number of the row, then by that of the slice.
+        self._upright: dict[int, dict[int, NDArray[np.float32]]] = {}
         # Slice by slice, so that no sum depends on how they were cut into slabs.
         self._lowest, self._highest, self._sums = np.zeros((3, count))
         self._samples = 0
@@ -76,7 +76,7 @@ class Preview:
         """Planes along the axis by their numbers, from the first slice to the last."""
         return {
             number: np.stack([rows[index] for index in sorted(rows)])
-            for number, rows in self.upright.items()
+            for number, rows in self._upright.items()
         }
 
     def take(self, start: int, block: NDArray[np.float32]) -> None:
@@ -97,7 +97,7 @@ class Preview:
         if self.count >= ENOUGH:
             for row in evenly(block.shape[1], min(block.shape[1], UPRIGHT)):
                 rows = smaller(block[:, row], axes=(1,))
-                self.upright.setdefault(row, {}).update(zip(passing, rows, strict=True))
+                self._upright.setdefault(row, {}).update(zip(passing, rows, strict=True))
 
     def statistics(self) -> dict[str, float]:
         """Least, greatest and mean value of the whole volume."""
