@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import Any
 
 from rift_cl.cl.device import Device
 from rift_cl.cl.discovery import alike_devices
+from rift_cl.cluster.fork_server import METHOD, begin_server
 
 LOOPBACK = "127.0.0.1"
 # What tells PoCL how many threads to take: until version 3, and since version 4.
@@ -37,14 +40,19 @@ def worker_environments(device: Device, selector: str | None, workers: int) -> l
     ]
 
 
-def local_cluster(environments: list[dict[str, str]]) -> Any:
-    """Start a scheduler and a worker for each environment, which this machine alone can reach."""
+@contextmanager
+def local_cluster(environments: list[dict[str, str]]) -> Iterator[Any]:
+    """A scheduler and a worker for each environment, which this machine alone can reach."""
+    begin_server()
     import dask
     from distributed import Nanny, Scheduler, SpecCluster
 
-    # Dask looks at every thread a hundred times a second: a processor's time, and memory that grows
-    # with the run.
-    watched = {"distributed.worker.profile.enabled": False}
+    settings = {
+        # Dask looks at every thread a hundred times a second: a processor's time, and memory that
+        # grows with the run.
+        "distributed.worker.profile.enabled": False,
+        "distributed.worker.multiprocessing-method": METHOD,
+    }
     scheduler = {
         "cls": Scheduler,
         "options": {"host": LOOPBACK, "port": 0, "dashboard_address": f"{LOOPBACK}:0"},
@@ -65,8 +73,12 @@ def local_cluster(environments: list[dict[str, str]]) -> Any:
         }
         for number, environment in enumerate(environments)
     }
-    with dask.config.set(watched):
-        return SpecCluster(workers=workers, scheduler=scheduler, silence_logs="CRITICAL")
+    # Until the end, since a worker that is lost is begun anew.
+    with (
+        dask.config.set(settings),
+        SpecCluster(workers=workers, scheduler=scheduler, silence_logs="CRITICAL") as cluster,
+    ):
+        yield cluster
 
 
 def _cores() -> int:

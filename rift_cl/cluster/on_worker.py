@@ -6,7 +6,7 @@ import secrets
 import socket
 import time
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
@@ -17,8 +17,16 @@ from rift_cl.own_parts import load_parts
 
 
 def dask_setup(worker: Any) -> None:
-    """Load a person's own parts, before objects of their classes arrive (``preload`` of Dask)."""
+    """Get ready, while the process that hands tasks out does so too (``preload`` of Dask).
+
+    A person's own parts are loaded before objects of their classes arrive. The device is opened;
+    ``look`` says why, where there is none.
+    """
+    from rift_cl.cl.discovery import open_device
+
     load_parts()
+    with suppress(DeviceError):
+        open_device()
 
 
 def look(device: str | None, paths: Sequence[Path]) -> dict[str, str]:

@@ -60,6 +60,8 @@ def cluster_workers(
 ) -> Iterator[Workers]:
     """The workers that ``--cluster`` names; those of this machine are started, and ended at last.
 
+    Some may still be to come (``Workers.wait``).
+
     Args:
         address: ``local:N``, or that of a scheduler.
         device: the one that was chosen here, whose memory local workers divide.
@@ -68,7 +70,7 @@ def cluster_workers(
 
     Raises:
         InputError: the address is none, or Dask is not installed.
-        ClusterError: no scheduler answers, or it has no workers.
+        ClusterError: no scheduler answers.
     """
     where = ClusterAddress.of(address)
     try:
@@ -76,13 +78,10 @@ def cluster_workers(
     except ImportError as error:
         raise InputError(f"--cluster needs Dask ({error}): pip install dask distributed") from error
     with ExitStack() as stack:
-        # Of versions we speak ourselves.
-        stack.enter_context(warnings.catch_warnings())
-        warnings.filterwarnings("ignore", module="distributed|tornado|asyncio")
         target: Any = address
         if where.workers:
             environments = worker_environments(device, selector, where.workers)
-            target = stack.enter_context(_started(environments))
+            target = _started(environments, stack)
         try:
             client = stack.enter_context(Client(target, timeout=_ANSWER, set_as_default=False))
         # The timeout of asyncio is an OSError from Python 3.11 on.
@@ -99,19 +98,28 @@ def cluster_workers(
                 f"--cluster {address}: no connection by TLS ({error}); name the certificates in "
                 "Dask's configuration, distributed.comm.tls.ca-file and client.cert and client.key"
             ) from error
-        workers = Workers(client, where, None if where.workers else selector, limit)
-        workers.wait()
-        yield workers
+        yield Workers(client, where, None if where.workers else selector, limit)
 
 
-def _started(environments: list[dict[str, str]]) -> Any:
-    """Workers of this machine.
+@contextmanager
+def quiet_dask() -> Iterator[None]:
+    """Without the warnings of Dask: of versions we speak ourselves.
+
+    For the main thread, whose other filters it leaves as they are: they are the whole process's.
+    """
+    with warnings.catch_warnings():
+        warnings.filterwarnings("ignore", module="distributed|tornado|asyncio")
+        yield
+
+
+def _started(environments: list[dict[str, str]], stack: ExitStack) -> Any:
+    """Workers of this machine, which end with the stack.
 
     Raises:
         ClusterError: they do not start.
     """
     try:
-        return local_cluster(environments)
+        return stack.enter_context(local_cluster(environments))
     except (OSError, RuntimeError) as error:
         raise ClusterError(
             f"the worker processes do not start ({error}); a script wants "

@@ -14,19 +14,20 @@ def kill_one(monkeypatch, after, by=signal.SIGKILL):
     psutil = pytest.importorskip("psutil")
     begin, begun = workers._Running.begin, []
 
-    def words_of(process):
-        # One that has just ended has none.
+    def is_worker(process):
+        """Spawned, or forked by the server, whose words it has; one that has ended is none."""
         with suppress(psutil.Error):
-            return " ".join(process.cmdline())
-        return ""
+            words = " ".join(process.cmdline())
+            forked = "forkserver" in words and process.ppid() != os.getpid()
+            return forked or "spawn_main" in words
+        return False
 
     def killing(self, task, tries=1):
         begin(self, task, tries)
         begun.append(task)
         if len(begun) == after:
             children = psutil.Process().children(recursive=True)
-            own = [child for child in children if "spawn_main" in words_of(child)]
-            os.kill(own[-1].pid, by)
+            os.kill([child for child in children if is_worker(child)][-1].pid, by)
 
     monkeypatch.setattr(workers._Running, "begin", killing)
     return begun

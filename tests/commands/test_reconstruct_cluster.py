@@ -85,6 +85,18 @@ def test_a_run_goes_on_with_a_part_that_a_worker_made(scan, tmp_path, monkeypatc
     assert volume.tobytes() == made(Reconstruction(settings(scan, tmp_path / "b")))[0].tobytes()
 
 
+def test_a_worker_leaves_doubts_to_the_process_that_began_the_run(scan, tmp_path, monkeypatch):
+    """They take as long as the search for the axis."""
+    kept, token = begin_anew(settings(scan, tmp_path / "out"))
+
+    def search(*_):
+        raise AssertionError("the axis is given")
+
+    monkeypatch.setattr("rift_cl.commands.inputs.told_axis.find_axis", search)
+    make_slices(settings(scan, tmp_path / "out", resume=True), (), token, 2, 4)
+    assert kept.missing() == [slice(0, 2), slice(4, ROWS)]
+
+
 def test_a_part_is_projected_as_the_run_began(scan, tmp_path):
     """By costs these slices take a projector in real space."""
     out = tmp_path / "out"

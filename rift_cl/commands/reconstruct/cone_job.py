@@ -13,7 +13,8 @@ import dataclasses
 import time
 from collections.abc import Callable, Generator, Iterable, Iterator, Mapping
 from contextlib import suppress
-from typing import Any, TypeAlias
+from functools import partial
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,6 +24,7 @@ from rift_cl.cl.budget import format_bytes
 from rift_cl.cl.device import Device
 from rift_cl.commands.pictures.coverage_pictures import add_missed_planes
 from rift_cl.commands.pictures.slice_pictures import display_window
+from rift_cl.commands.reconstruct.assembly import Assembly, TakeSlab
 from rift_cl.commands.reconstruct.cone_input import ConeInput, VolumeWindow, decided_cone_settings
 from rift_cl.commands.reconstruct.cone_slabs import ConeSlabs
 from rift_cl.commands.reconstruct.inversion import least_squares
@@ -40,6 +42,7 @@ from rift_cl.commands.reconstruct.report import (
     voxel,
 )
 from rift_cl.commands.reconstruct.settings import ReconstructSettings
+from rift_cl.commands.reconstruct.spread import begun_workers, spread
 from rift_cl.commands.reconstruct.volume import (
     chosen_window,
     clipped_words,
@@ -67,6 +70,10 @@ from rift_cl.reconstruct.direct.redundancy import ITERATE
 from rift_cl.reconstruct.solvers.tv_problem import VariationSolver
 from rift_cl.report.html_page import Page
 from rift_cl.report.plot import figure_png, image_grid
+
+if TYPE_CHECKING:
+    from rift_cl.cluster.beside import Beside
+    from rift_cl.cluster.workers import Workers
 
 Floats = NDArray[np.float32]
 Formula: TypeAlias = "FDK | Katsevich | Backprojection"
@@ -117,6 +124,8 @@ class ConeReconstruction:
         self.metrics: dict[str, Any] = {}
         self.announce: Callable[[str], None] = lambda line: None
         self._values: tuple[float, float] | None = None
+        # What the report and the picture show of the slices, as they come.
+        self._preview, self._sections = Preview(self.shape[0]), _Sections(self.shape)
         self._begin = time.perf_counter()
 
     def _own_folder(self) -> RunFolder:
@@ -255,42 +264,42 @@ class ConeReconstruction:
             yield Report(0, total, "steps")
         elif not self.settings.resume:
             yield self.report(0)
-        if in_slabs and self._goes_on:
-            self.source.take(self.kept.axis())
-        # What is assumed of the file is told first: where no axis is found, it may be why.
-        of_file = len(self.source.notes)
-        for note in self.source.notes:
-            self.announce(note)
-        self._locate()
-        if in_slabs and self._goes_on:
-            self.kept.go_on(self._facts())
-            self._gone_on = True
-        for note in self.source.notes[of_file:]:
-            self.announce(note)
-        self.folder.make()
-        try:
-            if self.settings.preview:
-                self._show(self._preview())
-                self.folder.release()
-                yield Report(total, total, "steps")
-                return
-            self._check_place()
-            if in_slabs:
-                yield from self._keep_slabs()
-                self._finish(None)
-                return
-            integrals = self._read()
-            self._count(dead_pixels=integrals.dead, starved_samples=integrals.starved)
-            yield Report(1, total, "steps")
-            slabs = yield from self._solve(integrals.projections, total)
-            self._finish(slabs)
-        except BaseException as error:
-            if not self._keep_what_is_done():
-                self.folder.discard()
-            elif isinstance(error, KeyboardInterrupt):
-                raise stopped(self.kept) from None
-            raise
-        yield Report(total, total, "steps")
+        with begun_workers(self) as workers:
+            if in_slabs and self._goes_on:
+                self.source.take(self.kept.axis())
+            # What is assumed of the file is told first: where no axis is found, it may be why.
+            of_file = len(self.source.notes)
+            for note in self.source.notes:
+                self.announce(note)
+            self._locate()
+            if in_slabs and self._goes_on:
+                self.kept.go_on(self._facts())
+                self._gone_on = True
+            for note in self.source.notes[of_file:]:
+                self.announce(note)
+            self.folder.make()
+            try:
+                if self.settings.preview:
+                    self._show(self._middle_slice())
+                    self.folder.release()
+                    yield Report(total, total, "steps")
+                    return
+                self._check_place()
+                if in_slabs:
+                    self._finish((yield from self._kept_volume(workers)))
+                    return
+                integrals = self._read()
+                self._count(dead_pixels=integrals.dead, starved_samples=integrals.starved)
+                yield Report(1, total, "steps")
+                slabs = yield from self._solve(integrals.projections, total)
+                self._finish(self._whole_volume(slabs))
+            except BaseException as error:
+                if not self._keep_what_is_done():
+                    self.folder.discard()
+                elif isinstance(error, KeyboardInterrupt):
+                    raise stopped(self.kept) from None
+                raise
+            yield Report(total, total, "steps")
 
     @property
     def _goes_on(self) -> bool:
@@ -320,27 +329,48 @@ class ConeReconstruction:
         self._locate()
         self.kept.go_on(self._facts(), names)
 
-    def _keep_slabs(self) -> Iterator[Report]:
-        """Make all slices that are missing, and keep them."""
+    def _kept_volume(self, workers: Beside[Workers] | None) -> Generator[Report, None, Assembly]:
+        """Make all slices that are missing, keep them, and put the volume together meanwhile."""
         self._check_sides(self._slabs.few_rows())
         self.source.clean.zingers = 0
         if not self._gone_on:
             self.kept.begin(self._facts())
-        if self.settings.cluster is None:
-            yield from self.work_on(self.kept.missing())
-            return
-        # Imported when used: a worker imports this module.
-        from rift_cl.commands.reconstruct.spread import spread
+        few = partial(self.kept.slices, self._preview.numbers)
+        parts = (slab for _, slab in self.kept.slabs())
+        waits = self.settings.dtype != "float32" and self.settings.window is None
+        with self._assembly(few, parts, waits=waits) as assembly:
+            if workers is None:
+                yield from self.work_on(self.kept.missing(), assembly.keep)
+            else:
+                yield from spread(self, workers, assembly)
+            assembly.complete()
+        return assembly
 
-        yield from spread(self)
+    def _whole_volume(self, slabs: Iterable[Floats]) -> Assembly:
+        """Put the volume together of slabs that are not kept, from its first slice on."""
 
-    def work_on(self, runs: list[slice]) -> Iterator[Report]:
-        """Make and keep runs of slices; a report after each part that found room."""
+        def few() -> list[Floats]:
+            # Volumes that come in several slabs have a window that was said (``_check_parts``).
+            (volume,) = slabs
+            return [volume[number] for number in self._preview.numbers]
+
+        with self._assembly(few, slabs) as assembly:
+            for start, block in _blocks(slabs):
+                assembly.take(start, block)
+        return assembly
+
+    def work_on(self, runs: list[slice], keep: TakeSlab) -> Iterator[Report]:
+        """Make runs of slices; a report after each part that found room.
+
+        Args:
+            runs: slices, counted from the first that is wanted.
+            keep: keeps a part.
+        """
         for run in runs:
             integrals = self._slabs.read(run)
             self._count(dead_pixels=integrals.dead, starved_samples=integrals.starved)
             for start, part in self._slabs.made(run, integrals.projections):
-                self.kept.save(start, part)
+                keep(start, part)
                 yield self.report(self.kept.done)
 
     def report(self, done: int, values: Mapping[str, float] | None = None) -> Report:
@@ -422,7 +452,7 @@ class ConeReconstruction:
         self.metrics |= {"steps": len(curve), "residual": curve[-1] if curve else 0.0}
         return [volume[self.source.part]]
 
-    def _preview(self) -> list[Floats]:
+    def _middle_slice(self) -> list[Floats]:
         """The middle slice alone, which a formula makes without the others."""
         if self._formula is None:
             raise InputError(
@@ -436,32 +466,30 @@ class ConeReconstruction:
         A = Projector(grid, self.source.geometry, device=self.device)
         return [np.asarray(self._formula_of(A)(self._read().projections))[0]]
 
-    def _finish(self, slabs: Iterable[Floats] | None) -> None:
-        """Write the volume, its pictures and the report.
+    def _assembly(
+        self, few: Callable[[], list[Floats]], parts: Iterable[Floats], *, waits: bool = False
+    ) -> Assembly:
+        """The volume to be.
 
         Args:
-            slabs: the volume from its first slice on; None where it is kept in slabs.
+            few: gives a few of its slices, which a window of values is chosen from.
+            parts: the volume in parts, for the same.
+            waits: whether that takes all slices.
         """
-        numbers = Preview(self.shape[0]).numbers
-        if slabs is None:
-            self._values = self._value_window(
-                lambda: self.kept.slices(numbers), (slab for _, slab in self.kept.slabs())
-            )
-            slabs = (slab for _, slab in self.kept.slabs())
-        elif isinstance(slabs, list):
-            volume = slabs[0]
-            self._values = self._value_window(lambda: [volume[n] for n in numbers], slabs)
-        else:
-            self._values = self.settings.window
-        preview, sections = Preview(self.shape[0]), _Sections(self.shape)
-        with self._open(self.settings, self._values) as writer:
-            for start, block in _blocks(slabs):
-                writer.write(start, block)
-                preview.take(start, block)
-                sections.take(start, block)
-        statistics = preview.statistics()
+
+        def opened() -> VolumeWriter:
+            self._values = self._value_window(few, parts)
+            return self._open(self.settings, self._values)
+
+        self._preview, self._sections = Preview(self.shape[0]), _Sections(self.shape)
+        takers = self._preview.take, self._sections.take
+        return Assembly(self.kept, opened, *takers, waits=waits)
+
+    def _finish(self, assembly: Assembly) -> None:
+        """Write the pictures and the report of the volume, which is there."""
+        statistics = self._preview.statistics()
         if self._values is not None:
-            below, above = writer.clipped
+            below, above = assembly.clipped
             self.metrics |= {"clipped_below": below, "clipped_above": above}
             reached = statistics["minimum"], statistics["maximum"]
             unit = self.source.unit if self.settings.attenuation else ""
@@ -469,7 +497,7 @@ class ConeReconstruction:
             self._say(*[clipped] if clipped else [])
         self.folder.mark()
         self.folder.drop(*set(VOLUME_NAMES.values()) - {volume_path(self.settings).name})
-        self._show(sections.planes)
+        self._show(self._sections.planes)
         if self.settings.zingers is not None:
             self.metrics["zingers"] = self.source.clean.zingers
         self.metrics = {"center": self.source.axis["center"], **self.metrics}
@@ -480,7 +508,7 @@ class ConeReconstruction:
         self.folder.finish(
             self.decided,
             record,
-            self._page(preview),
+            self._page(self._preview),
             self.device,
             asked=self.settings,
             axis=self.source.axis,

@@ -18,8 +18,9 @@ from rift_cl.cl.budget import plan_chunks
 from rift_cl.cl.device import Device
 from rift_cl.commands.reconstruct.settings import ReconstructSettings
 from rift_cl.commands.reconstruct.slice_input import SliceInput
-from rift_cl.commands.reconstruct.slice_window import Window
+from rift_cl.commands.reconstruct.slice_window import Window, cut_evenly
 from rift_cl.geometry import Fan, Grid, Parallel, at_axis
+from rift_cl.io.volumes.layout import PART
 from rift_cl.operators import (
     FastProjector,
     LinearOperator,
@@ -63,7 +64,7 @@ _LIMITED = np.pi / 6
 # Copies of what is read before it is binned.
 _READ = 2
 # Slices between two reports of progress; of those that take steps, each of which is reported.
-_SLAB, _ITERATIVE_SLAB = 16, 4
+_SLAB, _ITERATIVE_SLAB = PART, 4
 # Steps that are timed, after a first one that builds the kernels.
 _TIMED_STEPS = 3
 # The weight of the total variation for levels, as a share of what would level small features.
@@ -153,9 +154,8 @@ class Inversion:
         most = _ITERATIVE_SLAB if self.settings.iterative else _SLAB
         cut = []
         for run in runs:
-            for chunk in self._fitting(run.stop - run.start, A):
-                first, stop = run.start + chunk.start, run.start + chunk.stop
-                cut += [slice(at, min(at + most, stop)) for at in range(first, stop, most)]
+            fitting = [part.stop - part.start for part in self._fitting(run.stop - run.start, A)]
+            cut += cut_evenly(run, most if len(fitting) == 1 else min(most, *fitting))
         return cut
 
     def _fitting(self, count: int, A: AnyProjector) -> list[slice]:

@@ -2,7 +2,7 @@
 
 Rows are read, corrected, reconstructed and kept a slab at a time, as many together as the memory
 budget allows, so that the size of a scan is bounded by the disk alone, and that a run which was
-cut off goes on where it was.
+cut off goes on where it was. The volume is put together meanwhile (``assembly``).
 """
 
 from __future__ import annotations
@@ -12,13 +12,14 @@ import time
 from collections.abc import Callable, Generator, Iterator, Mapping
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rift_cl import __version__
 from rift_cl.cl.device import Device
+from rift_cl.commands.reconstruct.assembly import Assembly, TakeSlab
 from rift_cl.commands.reconstruct.clean_rows import LoadedRows
 from rift_cl.commands.reconstruct.decided import decided_settings
 from rift_cl.commands.reconstruct.inversion import Inversion
@@ -39,6 +40,7 @@ from rift_cl.commands.reconstruct.report import (
 )
 from rift_cl.commands.reconstruct.settings import ReconstructSettings
 from rift_cl.commands.reconstruct.slice_input import SliceInput
+from rift_cl.commands.reconstruct.spread import begun_workers, spread
 from rift_cl.commands.reconstruct.volume import (
     check_place,
     chosen_window,
@@ -48,9 +50,13 @@ from rift_cl.commands.reconstruct.volume import (
     volume_path,
 )
 from rift_cl.io.scans.scan_file import ScanFile
-from rift_cl.io.volumes import VOLUME_NAMES
+from rift_cl.io.volumes import VOLUME_NAMES, VolumeWriter
 from rift_cl.progress import Report
 from rift_cl.reconstruct import Attenuation
+
+if TYPE_CHECKING:
+    from rift_cl.cluster.beside import Beside
+    from rift_cl.cluster.workers import Workers
 
 # Slices from which a run by a formula is worth a look before it goes on.
 _PREVIEW_FROM = 8
@@ -87,6 +93,8 @@ class Reconstruction:
         self._ours, self._gone_on = False, False
         # What the integers of the volume stand for.
         self._values: tuple[float, float] | None = None
+        # What the report shows of the slices, as they come.
+        self._preview = Preview(self.shape[0])
         # Whether this run has left a picture of the middle slice.
         self._shown = False
         self._begin = time.perf_counter()
@@ -143,25 +151,28 @@ class Reconstruction:
             return
         if not self.settings.resume:
             yield Report(0, self._total, self._what)
-        self._settle()
-        self.folder.make()
-        try:
-            if self.settings.preview:
-                yield from self._look()
-                self.folder.release()
-                return
-            check_place(self.settings, self.source, self.inversion.window)
-            if not self._gone_on:
-                self._ours = True
-                self.kept.begin(self._facts(), self.inversion.projection)
-            yield from self._work()
-        except BaseException as error:
-            if not self._keep_what_is_done():
-                self.folder.discard()
-            elif isinstance(error, KeyboardInterrupt):
-                raise stopped(self.kept) from None
-            raise
-        self._finish()
+        with begun_workers(self) as workers:
+            self._settle()
+            self.folder.make()
+            try:
+                if self.settings.preview:
+                    yield from self._look()
+                    self.folder.release()
+                    return
+                check_place(self.settings, self.source, self.inversion.window)
+                if not self._gone_on:
+                    self._ours = True
+                    self.kept.begin(self._facts(), self.inversion.projection)
+                with self._assembly() as assembly:
+                    yield from self._work(workers, assembly)
+                    assembly.complete()
+            except BaseException as error:
+                if not self._keep_what_is_done():
+                    self.folder.discard()
+                elif isinstance(error, KeyboardInterrupt):
+                    raise stopped(self.kept) from None
+                raise
+            self._finish(assembly)
 
     def _settle(self) -> None:
         """Find the axis, and whether there is something to go on with; nothing is written.
@@ -200,7 +211,8 @@ class Reconstruction:
             CheckpointError: the run is not this one.
         """
         self._take_found()
-        self._locate()
+        # That process has told its doubts.
+        self._locate(doubt=False)
         self.kept.go_on(self._facts(), names)
         self.kept.shape = self.shape
 
@@ -214,11 +226,11 @@ class Reconstruction:
         if axis is not None:
             self.source.center, self.source.tilt, self.source.turned = axis
 
-    def _locate(self) -> None:
+    def _locate(self, *, doubt: bool = True) -> None:
         """Find the axis, and tell before any other work, this search too, that memory is short."""
         if not self.source.settled:
             self.inversion.check_memory()
-        self.source.locate()
+        self.source.locate(doubt=doubt)
         self.inversion.slabs([slice(0, 1)])
 
     @cached_property
@@ -257,32 +269,49 @@ class Reconstruction:
         count = self.shape[0]
         return count >= _PREVIEW_FROM or (self.settings.iterative and count > 1)
 
-    def _work(self) -> Iterator[Report]:
+    def _assembly(self) -> Assembly:
+        """The volume to be, which waits for all slices where they decide what integers mean."""
+        self._preview = Preview(self.shape[0])
+        return Assembly(
+            self.kept,
+            self._opened_volume,
+            self._preview.take,
+            self._show_once,
+            waits=self.settings.dtype != "float32" and self.settings.window is None,
+        )
+
+    def _opened_volume(self) -> VolumeWriter:
+        self._values = self._value_window()
+        return open_slices(self.settings, self.source, self.inversion.window, self._values)
+
+    def _work(self, workers: Beside[Workers] | None, assembly: Assembly) -> Iterator[Report]:
         """Every slice that is missing; first, of a long run, the middle one to look at."""
         # Less those of the row that the axis was looked for in.
         self.source.clean.zingers = 0
-        if not self._gone_on and self._looks_first and self.settings.cluster is None:
+        if not self._gone_on and self._looks_first and workers is None:
             yield from self._look()
         if self._gone_on:
             # Where it goes on, so that nobody takes what was done before for this run's pace.
             yield self.report(self.kept.done)
-        if self.settings.cluster is None:
-            yield from self.work_on(self.kept.missing())
+        if workers is None:
+            yield from self.work_on(self.kept.missing(), assembly.keep)
             return
-        # Imported when used: a worker imports this module.
-        from rift_cl.commands.reconstruct.spread import spread
+        yield from spread(self, workers, assembly)
 
-        yield from spread(self)
+    def work_on(self, runs: list[slice], keep: TakeSlab) -> Iterator[Report]:
+        """Reconstruct runs of slices, a slab at a time; a report after each.
 
-    def work_on(self, runs: list[slice]) -> Iterator[Report]:
-        """Reconstruct and keep runs of slices, a slab at a time; a report after each."""
+        Args:
+            runs: slices, counted from the first row that was asked for.
+            keep: keeps a slab; called in another thread, one slab at a time.
+        """
         done = self.kept.done
         values = {} if self.source.center is None else {"center": self.source.center}
         with Behind() as behind, ahead(self.inversion.slabs(runs), self._load) as load:
             for slab, loaded in load:
                 integrals = self.source.projections(loaded)
                 slices = yield from self._slab(slab, integrals, done)
-                behind.do(self.kept.save, slab.start, slices)
+                behind.do(keep, slab.start, slices)
                 done += slab.stop - slab.start
                 yield self.report(done, values)
 
@@ -315,6 +344,11 @@ class Reconstruction:
         self._shown = True
         return path
 
+    def _show_once(self, start: int, block: Floats) -> None:
+        """Leave the middle slice of a long run as a picture when it passes, unless there is one."""
+        if self._looks_first and not self._shown and self._preview.middle is not None:
+            self._show(self._preview.middle)
+
     def _load(self, slab: slice) -> LoadedRows:
         first = self.rows[0]
         return self.source.clean.load(first + slab.start, first + slab.stop)
@@ -345,20 +379,13 @@ class Reconstruction:
         """Add to the figures of the run."""
         self.metrics.update({name: self.metrics.get(name, 0) + n for name, n in found.items()})
 
-    def _finish(self) -> None:
-        """Make the volume of the slabs, and the report."""
+    def _finish(self, assembly: Assembly) -> None:
+        """Make the report of the volume, which is there."""
         # Pictures want memory that the device keeps for arrays to come.
         self.device.release()
-        preview = Preview(self.shape[0])
-        self._values = self._value_window()
-        window = self.inversion.window
-        with open_slices(self.settings, self.source, window, self._values) as volume:
-            for start, slab in self.kept.slabs():
-                volume.write(start, slab)
-                preview.take(start, slab)
-        statistics = preview.statistics()
+        statistics = self._preview.statistics()
         if self._values is not None:
-            below, above = volume.clipped
+            below, above = assembly.clipped
             self.metrics |= {"clipped_below": below, "clipped_above": above}
             reached = statistics["minimum"], statistics["maximum"]
             unit = self.source.unit if self.settings.attenuation else ""
@@ -368,8 +395,8 @@ class Reconstruction:
         self.folder.mark()
         self.folder.drop(*set(VOLUME_NAMES.values()) - {volume_path(self.settings).name})
         if not self._shown:
-            assert preview.middle is not None
-            self._show(preview.middle)
+            assert self._preview.middle is not None
+            self._show(self._preview.middle)
         if self.source.center is not None:
             self.metrics = {"center": self.source.center, **self.metrics}
         if self.settings.zingers is not None:
@@ -378,7 +405,7 @@ class Reconstruction:
         self.metrics.update(statistics)
         self.metrics["seconds"] = time.perf_counter() - self._begin
         self.metrics.pop("seconds_for_all", None)
-        page = reconstruction_page(self, preview)
+        page = reconstruction_page(self, self._preview)
         record = {**self.metrics, "assumed": self.source.notes}
         facts = {"axis": self.source.axis, "run": self._facts()}
         self.folder.finish(self.decided, record, page, self.device, asked=self.settings, **facts)
@@ -388,7 +415,7 @@ class Reconstruction:
         """What the integers of the volume stand for, from a few slices where it was not said."""
         if self.settings.dtype == "float32" or self.settings.window is not None:
             return self.settings.window
-        images = self.kept.slices(Preview(self.shape[0]).numbers)
+        images = self.kept.slices(self._preview.numbers)
         parts = (slab for _, slab in self.kept.slabs())
         values, sentence = chosen_window(self.settings, images, parts)
         self._say(sentence)

@@ -149,8 +149,7 @@ class SlabFolder:
         there = np.zeros(self.shape[0], np.bool_)
         for start, stop, _ in self._files():
             there[start:stop] = True
-        edges = np.flatnonzero(np.diff(np.pad(~there, 1).astype(np.int8)))
-        return [slice(int(a), int(b)) for a, b in edges.reshape(-1, 2)]
+        return _runs_without(there)
 
     def save(self, start: int, slices: Floats) -> None:
         """Keep a slab.
@@ -173,38 +172,54 @@ class SlabFolder:
                 own.unlink(missing_ok=True)
             raise
 
-    def slabs(self, numbers: Collection[int] | None = None) -> Iterator[tuple[int, Floats]]:
+    def slabs(
+        self,
+        numbers: Collection[int] | None = None,
+        but: NDArray[np.bool_] | None = None,
+    ) -> Iterator[tuple[int, Floats]]:
         """Slabs and the numbers of their first slices, in order; no slice comes twice.
 
         Workers of unequal memory, one of which was lost, may have kept the same slice in two slabs.
 
         Args:
             numbers: slices that are wanted; slabs without any of them are left out.
+            but: of each slice, whether it is not wanted.
 
         Raises:
             CheckpointError: one is damaged.
         """
-        given = 0
+        given = np.zeros(self.shape[0], np.bool_) if but is None else but.copy()
         for start, stop, path in self._files():
             if numbers is not None and not any(start <= number < stop for number in numbers):
                 continue
-            if stop <= given:
+            wanted = _runs_without(given[start:stop])
+            if not wanted:
                 continue
-            try:
-                # Mapped first, so that nothing is allocated for a size that is only claimed.
-                with reading(path, "the slab"):
-                    slab = np.load(path, mmap_mode="r", allow_pickle=False)
-            except InputError as error:
-                raise CheckpointError(f"{error}; remove it and go on with --resume") from error
-            if not isinstance(slab, np.ndarray):
-                raise CheckpointError(f"{path}: holds no array; remove it and go on with --resume")
-            if slab.shape != (stop - start, *self.shape[1:]) or slab.dtype != np.float32:
-                raise CheckpointError(
-                    f"{path}: holds {slab.dtype} {slab.shape}, wanted float32 "
-                    f"{(stop - start, *self.shape[1:])}; remove it and go on with --resume"
-                )
-            first, given = max(start, given), stop
-            yield first, np.array(slab[first - start :])
+            slab = self._slab(start, stop, path)
+            given[start:stop] = True
+            for run in wanted:
+                yield start + run.start, np.array(slab[run])
+
+    def _slab(self, start: int, stop: int, path: Path) -> Floats:
+        """A slab, mapped.
+
+        Raises:
+            CheckpointError: it is damaged.
+        """
+        try:
+            # Mapped first, so that nothing is allocated for a size that is only claimed.
+            with reading(path, "the slab"):
+                slab = np.load(path, mmap_mode="r", allow_pickle=False)
+        except InputError as error:
+            raise CheckpointError(f"{error}; remove it and go on with --resume") from error
+        if not isinstance(slab, np.ndarray):
+            raise CheckpointError(f"{path}: holds no array; remove it and go on with --resume")
+        if slab.shape != (stop - start, *self.shape[1:]) or slab.dtype != np.float32:
+            raise CheckpointError(
+                f"{path}: holds {slab.dtype} {slab.shape}, wanted float32 "
+                f"{(stop - start, *self.shape[1:])}; remove it and go on with --resume"
+            )
+        return slab
 
     def slices(self, numbers: Collection[int]) -> list[Floats]:
         """Single slices, in the order in which they are kept."""
@@ -227,6 +242,12 @@ class SlabFolder:
             (int(name[1]), int(name[2]), path) for name, path in named if name and path.is_file()
         )
         return [entry for entry in found if 0 <= entry[0] < entry[1] <= self.shape[0]]
+
+
+def _runs_without(marked: NDArray[np.bool_]) -> list[slice]:
+    """Runs of what is not marked, in order."""
+    edges = np.flatnonzero(np.diff(np.pad(~marked, 1).astype(np.int8)))
+    return [slice(int(a), int(b)) for a, b in edges.reshape(-1, 2)]
 
 
 def _renamed(fact: str, names: Mapping[str, str]) -> str:

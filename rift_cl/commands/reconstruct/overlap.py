@@ -78,6 +78,11 @@ class Behind:
         self.wait()
         self._begun = self._pool.submit(work, *arguments)
 
+    def offer(self, work: Callable[..., Any], *arguments: Any) -> None:
+        """Begin a piece of work unless one is under way; what the one before raised is raised."""
+        if self._begun is None or self._begun.done():
+            self.do(work, *arguments)
+
     def wait(self) -> None:
         """Wait for the piece that was begun; what it raised is raised here."""
         begun, self._begun = self._begun, None

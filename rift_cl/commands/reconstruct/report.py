@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -40,40 +39,52 @@ _BARS = 128
 PREVIEW_PICTURE = "preview.png"
 
 
-@dataclass
 class Preview:
-    """Collects a few slices and the statistics of all of them as they pass.
+    """Collects a few slices and the statistics of all of them as they pass, in any order.
 
     Args:
         count: slices of the volume.
-        panels: samples of a few slices so far, by their number (``thinned``).
-        middle: the middle slice, once it has passed.
-        frames: more of them, made smaller, for the slider through z.
-        upright: planes along the axis, for the slider through y: rows of every slice by their
-            number, from the first slice to the last, each made smaller.
     """
 
-    count: int
-    panels: dict[int, NDArray[np.float32]] = field(default_factory=dict)
-    middle: NDArray[np.float32] | None = None
-    frames: dict[int, NDArray[np.float32]] = field(default_factory=dict)
-    upright: dict[int, list[NDArray[np.float32]]] = field(default_factory=dict)
-    _lowest: float = np.inf
-    _highest: float = -np.inf
-    _sum: float = 0.0
-    _samples: int = 0
+    def __init__(self, count: int) -> None:
+        self.count = count
+        self.panels: dict[int, NDArray[np.float32]] = {}
+        """Samples of a few slices so far, by their number (``thinned``)."""
+        self.middle: NDArray[np.float32] | None = None
+        """The middle slice, once it has passed."""
+        self.frames: dict[int, NDArray[np.float32]] = {}
+        """More of them, made smaller, for the slider through z."""
+        # Of planes along the axis, for the slider through y, a row of every slice, made smaller: by
+        # the number of the row, then by that of the slice.
+        self._upright: dict[int, dict[int, NDArray[np.float32]]] = {}
+        # Slice by slice, so that no sum depends on how they were cut into slabs.
+        self._lowest, self._highest, self._sums = np.zeros((3, count))
+        self._samples = 0
 
     @property
     def numbers(self) -> list[int]:
         """Numbers of a few slices, evenly from the first to the last."""
         return evenly(self.count, min(self.count, _PANELS))
 
+    @property
+    def images(self) -> list[NDArray[np.float32]]:
+        """Samples of a few slices, from the first to the last."""
+        return [self.panels[number] for number in sorted(self.panels)]
+
+    @property
+    def planes(self) -> dict[int, NDArray[np.float32]]:
+        """Planes along the axis by their numbers, from the first slice to the last."""
+        return {
+            number: np.stack([rows[index] for index in sorted(rows)])
+            for number, rows in self._upright.items()
+        }
+
     def take(self, start: int, block: NDArray[np.float32]) -> None:
         """Look at a block of slices, the first of which is number ``start``."""
-        self._lowest = min(self._lowest, float(block.min()))
-        self._highest = max(self._highest, float(block.max()))
-        self._sum += float(block.sum(dtype=np.float64))
-        self._samples += block.size
+        for index, image in enumerate(block, start):
+            self._lowest[index], self._highest[index] = image.min(), image.max()
+            self._sums[index] = image.sum(dtype=np.float64)
+            self._samples = image.size
         passing = range(start, start + len(block))
         for index in self.numbers:
             if index in passing:
@@ -85,12 +96,14 @@ class Preview:
                 self.frames[index] = smaller(block[index - start])
         if self.count >= ENOUGH:
             for row in evenly(block.shape[1], min(block.shape[1], UPRIGHT)):
-                self.upright.setdefault(row, []).extend(smaller(block[:, row], axes=(1,)))
+                rows = smaller(block[:, row], axes=(1,))
+                self._upright.setdefault(row, {}).update(zip(passing, rows, strict=True))
 
     def statistics(self) -> dict[str, float]:
         """Least, greatest and mean value of the whole volume."""
-        mean = self._sum / self._samples
-        return {"minimum": self._lowest, "maximum": self._highest, "mean": mean}
+        mean = float(self._sums.sum()) / (self._samples * self.count)
+        lowest, highest = float(self._lowest.min()), float(self._highest.max())
+        return {"minimum": lowest, "maximum": highest, "mean": mean}
 
 
 def planned(job: Reconstruction, seconds: float) -> dict[str, str]:
@@ -159,20 +172,20 @@ def write_preview(path: Path, image: NDArray[np.float32], title: str) -> None:
 def reconstruction_page(job: Reconstruction | ConeReconstruction, preview: Preview) -> Page:
     """The report of a finished reconstruction."""
     page = Page(f"Reconstruction of {job.source.scan.path.name}", f"{job.shape[0]} slices")
-    images = list(preview.panels.values())
+    images, frames = preview.images, sorted(preview.frames.items())
     window, values = display_window(images), _values(job)
     show_slices(
         page,
-        list(preview.frames.values()),
-        labels=[f"slice {job.rows[0] + index}" for index in preview.frames],
+        [frame for _, frame in frames],
+        labels=[f"slice {job.rows[0] + index}" for index, _ in frames],
         window=window,
         what=f"{values}, slices across the axis",
     )
-    if preview.upright:
+    if planes := preview.planes:
         show_slices(
             page,
-            [smaller(np.stack(rows)) for rows in preview.upright.values()],
-            labels=[f"y {row}" for row in preview.upright],
+            [smaller(plane) for plane in planes.values()],
+            labels=[f"y {row}" for row in planes],
             window=window,
             what=f"{values}, planes along the axis",
         )

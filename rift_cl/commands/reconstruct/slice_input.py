@@ -170,10 +170,14 @@ class SliceInput:
         may_grow = not self.settled and is_full_turn(self.scan.angles)
         return 2 * self.bins if may_grow else self.bins
 
-    def locate(self) -> None:
+    def locate(self, *, doubt: bool = True) -> None:
         """Find the axis, and whether it is offset and the object wider than the detector.
 
         The axis is that of the whole scan; the object's width is judged by the middle row.
+
+        Args:
+            doubt: whether to look for what the data have against an axis that is known, which takes
+                as long as finding it.
 
         Raises:
             InputError: the axis cannot be found.
@@ -189,7 +193,7 @@ class SliceInput:
                 if not doubts:
                     raise
                 raise type(error)(" ".join([f"{error}.", *doubts])) from error
-        else:
+        elif doubt:
             self.notes += self._doubts(row[:, 0])
         self.fan = self._fan()
         self.geometry = self._geometry()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
@@ -64,6 +65,17 @@ class Window:
         left, right, top, bottom = (edge + margin for edge in self.roi)
         whole = Grid((self.size + 2 * margin,) * 2, self.pixel)
         return whole, (slice(top, bottom), slice(left, right))
+
+
+def cut_evenly(run: slice, most: int) -> list[slice]:
+    """Cut a run of slices at multiples of a number, so that parts of a volume's file are whole.
+
+    Args:
+        run: slices of the volume.
+        most: slices of a part.
+    """
+    edges = [run.start, *range((run.start // most + 1) * most, run.stop, most), run.stop]
+    return [slice(first, stop) for first, stop in pairwise(edges)]
 
 
 def check_window(roi: tuple[int, int, int, int], size: int) -> None:

@@ -9,19 +9,26 @@ either way, to the same bits.
 from __future__ import annotations
 
 import dataclasses
+import math
 from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
 
 from rift_cl.cluster.address import ClusterAddress
+from rift_cl.cluster.beside import Beside
 from rift_cl.cluster.on_worker import token
-from rift_cl.cluster.workers import Task, cluster_workers
 from rift_cl.commands.options import absolute_files
+from rift_cl.commands.reconstruct.assembly import Assembly
+from rift_cl.commands.reconstruct.overlap import Behind
 from rift_cl.commands.reconstruct.settings import ReconstructSettings
+from rift_cl.commands.reconstruct.slice_window import cut_evenly
+from rift_cl.io.volumes.layout import PART
 from rift_cl.progress import Report
 
 if TYPE_CHECKING:
+    from rift_cl.cluster.workers import Task, Workers
     from rift_cl.commands.reconstruct.cone_job import ConeReconstruction
     from rift_cl.commands.reconstruct.job import Reconstruction
 
@@ -47,25 +54,44 @@ class Receipt(NamedTuple):
     device: str
 
 
-def spread(job: Run) -> Iterator[Report]:
+@contextmanager
+def begun_workers(job: Run) -> Iterator[Beside[Workers] | None]:
+    """The workers that a run asks for, which begin while it is got ready; None where it asks none.
+
+    They end while whoever has done with them goes on.
+    """
+    settings = job.settings
+    if settings.cluster is None or settings.preview:
+        yield None
+        return
+    # Imported when used: most runs do without.
+    from rift_cl.cluster.workers import cluster_workers, quiet_dask
+
+    given = settings.cluster, job.device, settings.device, settings.part_timeout
+    with quiet_dask(), Beside(cluster_workers(*given)) as begun:
+        yield begun
+
+
+def spread(job: Run, begun: Beside[Workers], assembly: Assembly) -> Iterator[Report]:
     """Have the missing slices of a run that has begun made by workers; a report now and then.
+
+    What they have kept goes into the volume while they go on.
 
     Raises:
         RiftError: a worker cannot do it; what is done is kept.
     """
-    settings, kept = job.settings, job.kept
-    assert settings.cluster is not None
-    given = settings.cluster, job.device, settings.device, settings.part_timeout
-    with cluster_workers(*given) as workers:
-        job.announce(workers.sentence)
-        theirs, names = _of_workers(settings)
-        run = kept.mark()
-        with token(kept.path) as seen:
-            workers.check([theirs.out, *_files(theirs), seen])
-        runs = _runs(kept.missing(), len(workers), job.block)
-        tasks = (_task(wanted, theirs, names, run) for wanted in runs)
-        used: set[str] = set()
-        done, lost = -1, 0
+    kept, workers = job.kept, begun.get()
+    workers.wait()
+    job.announce(workers.sentence)
+    theirs, names = _of_workers(job.settings)
+    run = kept.mark()
+    with token(kept.path) as seen:
+        workers.check([theirs.out, *_files(theirs), seen])
+    runs = _runs(kept.missing(), len(workers), job.block)
+    tasks = (_task(wanted, theirs, names, run) for wanted in runs)
+    used: set[str] = set()
+    done, lost = -1, 0
+    with Behind() as behind:
         for come in workers.each(make_slices, tasks):
             if come is not None:
                 used.add(come[1].device)
@@ -73,9 +99,11 @@ def spread(job: Run) -> Iterator[Report]:
             if workers.lost > lost:
                 lost = workers.lost
                 job.announce("a worker was lost: its slices go to another")
+            behind.offer(assembly.catch_up)
             if kept.done > done:
                 done = kept.done
                 yield job.report(done, {"workers": len(workers)})
+        begun.leave()
     job.metrics["workers"] = len(workers)
     if len(used) > 1:
         job.source.notes.append(
@@ -94,13 +122,16 @@ def _runs(missing: list[slice], workers: int, block: int) -> Iterator[slice]:
     """
     count = sum(wanted.stop - wanted.start for wanted in missing)
     each = max(1, min(_MOST, -(-count // (_SHARES * workers))))
+    if each > PART:
+        block = math.lcm(block, PART)
     each = -(-each // block) * block
     for wanted in missing:
-        for first in range(wanted.start, wanted.stop, each):
-            yield slice(first, min(first + each, wanted.stop))
+        yield from cut_evenly(wanted, each)
 
 
 def _task(wanted: slice, settings: ReconstructSettings, names: Mapping[str, str], run: str) -> Task:
+    from rift_cl.cluster.workers import Task
+
     given = settings, tuple(names.items()), run, wanted.start, wanted.stop
     return Task(f"slices {wanted.start} to {wanted.stop}", given, wanted.stop - wanted.start)
 
@@ -150,7 +181,7 @@ def make_slices(
     job = _joined(settings, names, run)
     job.metrics, job.source.clean.zingers = {}, 0
     job.inversion.residuals.clear()
-    for _ in job.work_on([slice(first, stop)]):
+    for _ in job.work_on([slice(first, stop)], job.kept.save):
         pass
     device = f"{job.device.name} ({job.device.platform} {job.device.driver})"
     residuals = dict(job.inversion.residuals)

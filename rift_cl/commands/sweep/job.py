@@ -120,12 +120,13 @@ class Sweep:
         """Do runs on the workers of a cluster, a whole one on each."""
         from rift_cl.cluster.address import ClusterAddress
         from rift_cl.cluster.on_worker import token
-        from rift_cl.cluster.workers import Task, cluster_workers
+        from rift_cl.cluster.workers import Task, cluster_workers, quiet_dask
 
         settings, done = self.settings, len(self.runs) - len(left)
         local = ClusterAddress.of(settings.cluster or "").workers > 0
         where = settings.cluster or "", self.device, settings.device, settings.part_timeout
-        with cluster_workers(*where) as workers:
+        with quiet_dask(), cluster_workers(*where) as workers:
+            workers.wait()
             self.announce(workers.sentence)
             with token(settings.out.absolute() / _RUNS) as seen:
                 workers.check([*_files(left), seen])

@@ -15,6 +15,8 @@ from rift_cl.geometry.numbers import real_numbers
 from rift_cl.io.volumes.sample_window import SampleWindow
 
 Floats = NDArray[np.float32]
+# Slices that a file of parts holds together: a slab that is cut at multiples of it is written once.
+PART = 16
 # Takes the number of a first slice, and slices in the file's type.
 WriteSlab = Callable[[int, NDArray[Any]], None]
 

@@ -28,12 +28,12 @@ from numpy.typing import NDArray
 from rift_cl.errors import FileFormatError, PathEscapeError, ShapeError
 from rift_cl.io.boundary import check_claim, check_numeric
 from rift_cl.io.output import staged_folder, writing
-from rift_cl.io.volumes.layout import Floats, VolumeLayout, VolumePlace, WriteSlab
+from rift_cl.io.volumes.layout import PART, Floats, VolumeLayout, VolumePlace, WriteSlab
 from rift_cl.io.volumes.sample_window import restored, suggested_window
 from rift_cl.io.volumes.slice_statistics import SliceStatistics
 from rift_cl.io.zarr_store import check_codecs, check_entries, read_header
 
-_CHUNK = (16, 256, 256)
+_CHUNK = (PART, 256, 256)
 # Packing of chunks: nearly as fast as none, and every reader of Zarr has it.
 _COMPRESSOR = {"id": "blosc", "cname": "zstd", "clevel": 1, "shuffle": 2, "blocksize": 0}
 # Slices of the coarsest copy from which the range to display is taken.
@@ -51,16 +51,15 @@ def staged_volume(path: Path, layout: VolumeLayout) -> Iterator[WriteSlab]:
         with writing(path):
             _write_json(folder / ".zgroup", {"zarr_format": 2})
             _write_json(folder / ".zattrs", {_OURS: {**layout.attributes, "complete": False}})
-            volume = _create(folder / "0", layout.shape, layout)
+            levels = _Levels(folder, layout)
 
         def write_slab(start: int, slab: NDArray[Any]) -> None:
             with writing(path), _one_thread():
-                volume[start : start + len(slab)] = slab
+                levels.write(start, slab)
 
         yield statistics.watching(write_slab)
         with writing(path):
-            coarsest = _write_copies(folder, layout, volume)
-            shown = _display(layout, statistics.range, coarsest)
+            shown = _display(layout, statistics.range, levels.coarsest)
             _write_json(folder / ".zattrs", _attributes(path, layout, shown))
 
 
@@ -123,29 +122,73 @@ def _create(place: Path, shape: tuple[int, ...], layout: VolumeLayout) -> Any:
         return zarr.open_array(str(place), mode="r+", zarr_format=2)
 
 
-def _write_copies(folder: Path, layout: VolumeLayout, finest: Any) -> NDArray[Any]:
-    """Write the coarser copies, chunk by chunk, and give the coarsest of all."""
-    finer = finest
-    for level, (shape, factors) in enumerate(coarser_shapes(layout.shape), 1):
-        coarser = _create(folder / str(level), shape, layout)
-        for chunk in _chunks(shape, coarser.chunks):
+class _Levels:
+    """The volume and its coarser copies, of which each part is made once all below it is there.
+
+    Args:
+        folder: of the store.
+        layout: the volume.
+    """
+
+    def __init__(self, folder: Path, layout: VolumeLayout) -> None:
+        copies = coarser_shapes(layout.shape)
+        shapes = [layout.shape, *(shape for shape, _ in copies)]
+        self._factors = [factors for _, factors in copies]
+        self._arrays = [_create(folder / str(n), shape, layout) for n, shape in enumerate(shapes)]
+        # Of each slice of each level, whether it is on the disk.
+        self._written = [np.zeros(shape[0], np.bool_) for shape in shapes]
+
+    @property
+    def coarsest(self) -> NDArray[Any]:
+        """The coarsest copy."""
+        return np.asarray(self._arrays[-1][...])
+
+    def write(self, start: int, slab: NDArray[Any]) -> None:
+        """Write slices of the volume, and what they complete of the copies."""
+        self._arrays[0][start : start + len(slab)] = slab
+        self._wrote(0, slice(start, start + len(slab)))
+
+    def _wrote(self, level: int, slices: slice) -> None:
+        """Note slices of a level, and write those of the next whose last ones they are."""
+        self._written[level][slices] = True
+        if level == len(self._factors):
+            return
+        factor, coarser = self._factors[level][0], self._arrays[level + 1]
+        depth, count = coarser.chunks[0], coarser.shape[0]
+        first = slices.start // factor // depth * depth
+        for start in range(first, min(count, -(-slices.stop // factor)), depth):
+            made = slice(start, min(start + depth, count))
+            finer = slice(factor * made.start, factor * made.stop)
+            if self._written[level][finer].all():
+                self._halve(level, made)
+                self._wrote(level + 1, made)
+
+    def _halve(self, level: int, slices: slice) -> None:
+        """Write slices of the level above, chunk by chunk."""
+        finer, coarser, factors = (
+            self._arrays[level],
+            self._arrays[level + 1],
+            self._factors[level],
+        )
+        for chunk in _chunks(slices, coarser.shape, coarser.chunks):
             source = tuple(
                 slice(f * part.start, min(f * part.stop, n))
                 for part, f, n in zip(chunk, factors, finer.shape, strict=True)
             )
-            with _one_thread():
-                coarser[chunk] = halved(np.asarray(finer[source]), factors)
-        finer = coarser
-    return np.asarray(finer[...])
+            coarser[chunk] = halved(np.asarray(finer[source]), factors)
 
 
-def _chunks(shape: tuple[int, ...], chunks: tuple[int, ...]) -> Iterator[tuple[slice, ...]]:
-    starts = (range(0, n, chunk) for n, chunk in zip(shape, chunks, strict=True))
+def _chunks(
+    slices: slice, shape: tuple[int, ...], chunks: tuple[int, ...]
+) -> Iterator[tuple[slice, ...]]:
+    """The chunks of an array that slices of one depth of them lie in."""
+    starts = (range(0, n, chunk) for n, chunk in zip(shape[1:], chunks[1:], strict=True))
     for corner in product(*starts):
-        yield tuple(
+        frame = (
             slice(at, min(at + chunk, n))
-            for at, chunk, n in zip(corner, chunks, shape, strict=True)
+            for at, chunk, n in zip(corner, chunks[1:], shape[1:], strict=True)
         )
+        yield slices, *frame
 
 
 def _attributes(path: Path, layout: VolumeLayout, shown: dict[str, float]) -> dict[str, Any]:
