@@ -263,15 +263,14 @@ def _wrapped(line: str) -> list[str]:
 
 def _demo(settings: Any, output: Output) -> None:
     from rift_cl.commands.demo.job import COLUMNS, SCORING, DemoJob, what_to_see
-    from rift_cl.commands.fit_photos.report import COLUMNS as FIT_COLUMNS
-    from rift_cl.commands.fit_photos.report import SCORING as FIT_SCORING
-    from rift_cl.commands.fit_photos.report import score_rows
+    from rift_cl.commands.fit_photos.report import score_table
 
     job = DemoJob(settings)
     run_job(job, output)
     print_table(COLUMNS, job.rows, caption=f"{SCORING} {what_to_see(job.rows)}")
     for name, fit in job.fits.items():
-        print_table(FIT_COLUMNS, score_rows(fit.metrics), caption=f"{name}: {FIT_SCORING}")
+        columns, rows, caption = score_table(fit.metrics)
+        print_table(columns, rows, caption=f"{name}: {caption}")
     print(f"pictures and report.html are in {settings.out}")
 
 
@@ -337,13 +336,14 @@ def _fitted(job: Any, table: Any, output: Output) -> bool:
     with gentle_interrupt(job.stop):
         done = ran(job, job.settings, output)
     if done:
-        print_table(table.COLUMNS, table.score_rows(job.metrics), caption=table.SCORING)
+        columns, rows, caption = table.score_table(job.metrics)
+        print_table(columns, rows, caption=caption)
     return done
 
 
 def _eval(settings: Any, output: Output) -> None:
     from rift_cl.commands.evaluate.job import Evaluation
-    from rift_cl.commands.evaluate.report import score_table
+    from rift_cl.commands.fit_photos.report import score_table
 
     job = Evaluation(settings)
     if not ran(job, settings, output):

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -24,6 +25,10 @@ from rift_cl.train.settings import TrainSettings
 from rift_cl.train.start.lobes import lobe_axes
 from rift_cl.train.start.normals import neighbour_normals
 
+# Share of the run after which poses move: what begins as fog would carry all cameras along. Beyond
+# the fastest rate the first steps of Adam, as long whatever the gradient, would only throw cameras
+# about.
+_POSES_BEGIN, _FASTEST_POSES = 0.1, 3e-3
 # Learning rates at the very end of the cooldown, as a fraction of those at its beginning.
 _LAST_SHARE = 0.05
 
@@ -35,10 +40,12 @@ class LearningRateSchedule:
     Args:
         settings: of the run.
         extent: size of the scene, in its units.
+        views: number of training views.
     """
 
     settings: TrainSettings
     extent: float
+    views: int = 1
 
     @property
     def cooldown(self) -> int:
@@ -65,9 +72,36 @@ class LearningRateSchedule:
             "environment": fade * rates.environment,
             "reflectance": fade * rates.reflectance,
             "normals": fade * rates.normals,
-            "poses": fade * rates.poses * falling,
+            "poses": self._pose_share(step) * self._pose_rate,
             "exposures": fade * rates.exposures * falling,
         }
+
+    @property
+    def pose_reach(self) -> float:
+        """How far a camera can move, about each axis in radians, along each in extents.
+
+        As far as the settings say, or less in a run of few steps for each view.
+        """
+        return self._pose_rate * self._pose_shares / self.views
+
+    @cached_property
+    def _pose_rate(self) -> float:
+        """The largest rate of poses, such that a view's steps add up to the reach.
+
+        A step of Adam is as long as its rate at most, and a view is looked at in one step of as
+        many as there are views.
+        """
+        shares, wanted = self._pose_shares, self.settings.learning_rates.pose_reach
+        return min(wanted * self.views / shares, _FASTEST_POSES) if shares else 0.0
+
+    @cached_property
+    def _pose_shares(self) -> float:
+        return sum(self._pose_share(step) for step in range(self.settings.steps))
+
+    def _pose_share(self, step: int) -> float:
+        """The rate of poses at a step, in units of the largest: none at first, then falling."""
+        steps = self.settings.steps
+        return 1 - step / steps if _POSES_BEGIN * steps <= step < steps else 0.0
 
 
 class CoefficientSchedule:

@@ -66,9 +66,10 @@ class LearningRates:
     """Learning rate of the constant colour (spherical harmonic of degree 0)."""
     sh_rest: float = 1.0
     """Learning rate of harmonics of degree 1 and above, as a fraction of --learning-rates.sh."""
-    poses: float = 1e-3
-    """Learning rate of camera poses, if they are refined: of rotations in radians, of positions as
-    a fraction of the scene's extent; it falls as that of the splats' positions does."""
+    pose_reach: float = 0.02
+    """How far a camera can move in a run if poses are refined, about each axis in radians, along
+    each as a fraction of the scene's extent; less in runs of few steps for each view. The learning
+    rate follows from it."""
     exposures: float = 1e-2
     """Learning rate of each image's gains and offsets, if they are refined; it falls likewise."""
     shape_modes: float = 2.5e-3

@@ -121,8 +121,8 @@ class Trainer:
         settings.solve.check_heed(self.solves)
         self.device: Device = parameters.device
         check_own_loss(self.device, settings.loss)
-        self.schedule = LearningRateSchedule(settings, scene_extent(pictures.cameras))
-        extent, views = self.schedule.extent, len(pictures.cameras)
+        extent, views = scene_extent(pictures.cameras), len(pictures.cameras)
+        self.schedule = LearningRateSchedule(settings, extent, views)
         self.size = scene_size(pictures.cameras)
         self._mean_pixels = sum(math.prod(camera.size) for camera in pictures.cameras) / views
         run = TrainingRun(

@@ -60,7 +60,7 @@ def test_an_exact_picture_is_in_no_mean_and_told():
 def test_without_a_common_picture_the_fit_stands_alone():
     scores = [view("a", 10.0), view("b", 20.0)]
     groups = {"held out": scores}
-    assert score_rows(compared_record(groups)) == [("held out", "PSNR", 15.0, None, None)]
+    assert score_rows(compared_record(groups)) == [("held out", "PSNR", 15.0, None, None, None)]
     (note,) = comparison_notes(groups)
     assert "nothing to compare" in note and not doubt_notes(scores)
 

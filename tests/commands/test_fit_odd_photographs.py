@@ -45,6 +45,13 @@ def test_exposures_that_are_fitted_are_not_told(capture, tmp_path, capsys):
     exposed = changed(capture, tmp_path / "exposed", lambda k, image: image * (0.6 + 0.4 * (k % 2)))
     said = told(exposed, tmp_path / "fit", capsys, "--refine-exposures")
     assert "--refine-exposures" not in said
+    assert "gains were found between" in said
+    metrics = json.loads((tmp_path / "fit" / "metrics.json").read_text())
+    scores, found = metrics["scores"]["held out"], metrics["exposures"]["held out"]
+    assert scores["fit_psnr"] > scores["given_psnr"] + 3
+    # Of the three that were held out, 0, 3 and 6, the second was exposed longer.
+    gains = [np.mean(found[f"{number}.png"]["gain"]) for number in (0, 3, 6)]
+    assert gains[1] > 1.3 * max(gains[0], gains[2])
 
 
 def test_photographs_of_nothing_are_told(capture, tmp_path, capsys):

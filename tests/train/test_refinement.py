@@ -2,14 +2,22 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 from test_start import ring
+from test_trainer import SETTINGS, Ball
 
 from rift_cl.geometry import Camera
-from rift_cl.train.per_view.exposures import Exposures
+from rift_cl.geometry.common_motion import Similarity
+from rift_cl.train.parameters import Parameters
+from rift_cl.train.per_view.exposures import Exposures, fitted_exposure
+from rift_cl.train.per_view.held_out_poses import placed_cameras
 from rift_cl.train.per_view.poses import Poses, twist_gradient
+from rift_cl.train.settings import LearningRates
+from rift_cl.train.trainer import Trainer
 
 pytestmark = pytest.mark.dealt
 
@@ -120,3 +128,53 @@ def test_a_state_brings_both_back(device, kind):
         step(one)
     for name, array in made[0].state().items():
         np.testing.assert_array_equal(array, made[1].state()[name], err_msg=name)
+
+
+def missed(cameras, truth, points):
+    """How far points of a scene are from where they are to be seen, root mean square in pixels."""
+    gaps = [
+        seen(one, points) - seen(other, points) for one, other in zip(cameras, truth, strict=True)
+    ]
+    return np.sqrt(np.mean(np.square(gaps)))
+
+
+def seen(camera, points):
+    at = (points @ camera.view[:3, :3].T + camera.view[:3, 3]) @ camera.K.T
+    return at[:, :2] / at[:, 2:]
+
+
+@pytest.mark.parametrize("exposed", [False, True])
+def test_cameras_that_were_held_out_go_where_their_photographs_were_taken(device, exposed):
+    """The trained cameras have moved together: those that were given badly are to follow them."""
+    rates = LearningRates(pose_reach=0.03)
+    settings = replace(SETTINGS, refine_poses=True, refine_exposures=exposed, learning_rates=rates)
+    ball, motion = Ball(device), Similarity(1.0, np.eye(3), np.array([0.05, 0.0, -0.1]))
+    truth, back = ball.cameras, Similarity(1.0, np.eye(3), -motion.shift)
+    ball.cameras = [back.camera(camera) for camera in truth]
+    trainer = Trainer(ball, Parameters.of(device, ball.raw), settings)
+    trainer.poses.views = np.array([camera.view for camera in truth])
+    ball.cameras, truth = disturbed(ball.cameras, 0.006, 0.02)[:1], truth[:1]
+    if exposed:
+        ball.images = [0.8 * image + 0.05 for image in ball.images]
+    start = missed(ball.cameras, truth, ball.raw["means"])
+    followed = [motion.camera(camera) for camera in ball.cameras]
+    moved = missed(followed, truth, ball.raw["means"])
+    found = missed(list(placed_cameras(trainer, ball)), truth, ball.raw["means"])
+    assert found < 0.3 * moved < 0.5 * start
+
+
+def test_the_best_exposure_of_a_picture_is_that_of_least_squares():
+    random = np.random.default_rng(3)
+    image = random.uniform(size=(6, 7, 3)).astype(np.float32)
+    wanted = np.array([[1.2, 0.7, 1.0], [-0.1, 0.05, 0.0]])
+    target = (wanted[0] * image + wanted[1]).astype(np.float32)
+    np.testing.assert_allclose(fitted_exposure(image, target), wanted, atol=1e-5)
+    counted = random.uniform(size=(6, 7)) < 0.6
+    target[~counted] = 7
+    np.testing.assert_allclose(fitted_exposure(image, target, counted), wanted, atol=1e-5)
+    # Of one colour, of nothing that counts, and of what falls where the photograph rises.
+    flat = fitted_exposure(np.full_like(image, 0.3), target, counted)
+    np.testing.assert_array_equal(flat[0], 1)
+    none = fitted_exposure(image, target, np.zeros((6, 7), bool))
+    np.testing.assert_array_equal(none, [[1] * 3, [0] * 3])
+    np.testing.assert_array_equal(fitted_exposure(image, -image)[0], 0)

@@ -43,6 +43,7 @@ class Ball:
         points = MIDDLE + points / np.linalg.norm(points, axis=1, keepdims=True)
         raw = start_splats(points, 0.5 + 0.4 * np.sin(3 * points), seed=0)
         raw["logits"][:] = 3
+        self.raw = raw
         scene = Parameters.of(device, raw).drawn
         renderer = Renderer(SplatSettings(), device=device)
         self.grey = device.array(np.full(3, 0.5, np.float32))
@@ -143,6 +144,22 @@ def test_learning_rates_fall_and_fall_further_in_the_cooldown():
     assert middle["logits"] == first["logits"]
     for name in GROUPS:
         assert last[name] == pytest.approx(0.05 * middle[name]), name
+
+
+@pytest.mark.parametrize(("steps", "views"), [(700, 7), (3000, 60), (3000, 250)])
+def test_poses_reach_as_far_whatever_the_steps_and_views(steps, views):
+    settings = TrainSettings(steps=steps, learning_rates=LearningRates(pose_reach=0.01))
+    schedule = LearningRateSchedule(settings, extent=2.0, views=views)
+    rates = [schedule.learning_rates(step)["poses"] for step in range(steps)]
+    assert sum(rates) / views == pytest.approx(0.01)
+    assert schedule.pose_reach == pytest.approx(0.01)
+    assert rates[0] == 0 and rates[-1] < 0.01 * max(rates)
+
+
+def test_poses_of_short_runs_are_not_thrown_about():
+    schedule = LearningRateSchedule(TrainSettings(steps=20), extent=2.0, views=6)
+    assert schedule.pose_reach < 0.01
+    assert LearningRateSchedule(TrainSettings(steps=1), extent=2.0).pose_reach == 0
 
 
 @pytest.mark.full

@@ -54,7 +54,7 @@ DECODING, UPLOAD = "decoding of the picture", "upload"
 # Share of the splats that have faded when the price of a relocation is taken.
 _FADED, _FADED_LOGIT = 0.05, -7.0
 # Fits of more than splats, whose waits are looked at as well.
-_REFINED = LearningRates(poses=1e-4, exposures=1e-3)
+_REFINED = LearningRates(pose_reach=1e-3, exposures=1e-3)
 
 
 def stage_of(kernel: str) -> str:

@@ -190,13 +190,14 @@ class Evaluation:
             test = self._pictures(views, training)
             self.scores[name], self.backgrounds[name] = [], test.behind
             self.notes.append(self._background_note(name, test))
-            for score in score_views(renderer, splats, test, training, self.more):
+            exposed = self.scene.refined("exposures")
+            for score in score_views(renderer, splats, test, training, self.more, exposed=exposed):
                 self.scores[name].append(score)
                 yield Report(len(self.scores[name]), len(views), f"views of {name}")
         self.scores = {name: scores for name, scores in self.scores.items() if scores}
         if not self.scores:
             raise InputError(f"{self.scene.name}: every mask is black, there is nothing to score")
-        self.notes += [*self._left_out(), *comparison_notes(self.scores)]
+        self.notes += [*self._refined(), *self._left_out(), *comparison_notes(self.scores)]
         self.metrics = {
             "splats": len(self.scene.splats),
             "eps2d": self.scene.rendering.eps2d,
@@ -224,6 +225,20 @@ class Evaluation:
         color = in_display_light(pictures.behind, self.scene.light)
         shown = " ".join(f"{value:.3g}" for value in color)
         return f"pictures of {name} are drawn over {shown}, {self._told or found}"
+
+    def _refined(self) -> list[str]:
+        """Sentences about what is fitted to the pictures that are scored."""
+        notes = []
+        if self.scene.refined("poses"):
+            own = "poses of the held-out photographs are those that the fit refined against them"
+            other = "poses are those of the captures, which the fit's may have moved away from"
+            notes.append(other if self.settings.captures else own)
+        if self.scene.refined("exposures"):
+            notes.append(
+                "a gain and an offset of each colour are fitted to each photograph, as the fit did;"
+                " 'as given' scores the splats without them"
+            )
+        return notes
 
     def _left_out(self) -> list[str]:
         """A sentence about pictures that a score has no meaning of."""

@@ -3,18 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from itertools import compress
 from typing import Any
 
 from rift_cl.commands.fit_photos.error_places_report import show_error_places
-from rift_cl.commands.fit_photos.report import (
-    COLUMNS,
-    SCORES,
-    SCORING,
-    SCORING_ALONE,
-    score_rows,
-    show_views,
-)
+from rift_cl.commands.fit_photos.report import SCORES, score_table, show_views
 from rift_cl.commands.fit_photos.scores import ViewScore
 from rift_cl.report.html_page import Page
 
@@ -44,14 +36,6 @@ def eval_page(
         page.table(columns, [_row(score, kinds, trained) for score in scores], caption=group)
     show_error_places(page, metrics["errors"])
     return page
-
-
-def score_table(metrics: Mapping[str, Any]) -> tuple[Sequence[str], list[tuple[Any, ...]], str]:
-    """Columns and rows of mean scores, and a caption; without baselines where there are none."""
-    rows = score_rows(metrics)
-    known = [any(row[place] is not None for row in rows) for place in range(len(COLUMNS))]
-    caption = SCORING if all(known) else SCORING_ALONE
-    return list(compress(COLUMNS, known)), [tuple(compress(row, known)) for row in rows], caption
 
 
 def _row(score: ViewScore, kinds: Sequence[str], trained: bool) -> tuple[Any, ...]:

@@ -14,8 +14,9 @@ import numpy as np
 
 from rift_cl.commands.fit_photos.scores import ViewScore, mean_scores
 
-# What a table compares, by the beginning of the scores' names.
-COMPARED = ("fit", "nearest", "blend")
+# What a table compares, by the beginning of the scores' names. Where poses or exposures are fitted
+# to the pictures that are scored, what is drawn without that is "given".
+COMPARED = ("fit", "given", "nearest", "blend")
 
 
 class ComparedMeans(NamedTuple):

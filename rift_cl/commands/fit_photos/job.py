@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import time
-from collections.abc import Iterator
+from collections.abc import Generator, Iterator, Mapping
 
 from rift_cl.commands.cameras.arc import check_places, place_notes
 from rift_cl.commands.cameras.fit_cameras import CAMERA_FILES, save_fit_cameras, with_poses
@@ -22,6 +22,12 @@ from rift_cl.commands.fit_photos.photograph_size import (
 )
 from rift_cl.commands.fit_photos.pictures import CapturePictures
 from rift_cl.commands.fit_photos.pose_check import check_poses
+from rift_cl.commands.fit_photos.refined import (
+    exposure_notes,
+    exposure_record,
+    pose_notes,
+    pose_record,
+)
 from rift_cl.commands.fit_photos.report import (
     brightness_notes,
     doubt_notes,
@@ -42,6 +48,7 @@ from rift_cl.commands.fit_photos.view_split import (
 )
 from rift_cl.commands.pictures.evenly_spaced import evenly
 from rift_cl.errors import InputError
+from rift_cl.geometry import Camera
 from rift_cl.io.captures.capture import (
     Capture,
     View,
@@ -56,9 +63,12 @@ from rift_cl.splat.bands import FrameMemory
 from rift_cl.splat.orders import ModeOrders
 from rift_cl.splat.settings import SMALL_TILE
 from rift_cl.train.loss.homogenisation import noise_of
+from rift_cl.train.per_view.held_out_poses import placed_cameras
 from rift_cl.train.strategy import DefaultSettings
 from rift_cl.train.trainer import Trainer
 
+# The group of photographs that the fit itself holds out.
+_HELD_OUT = "held out"
 # Photographs from which the noise is estimated.
 _NOISE_VIEWS = 8
 
@@ -228,12 +238,79 @@ class Fit(FitRun[FitPhotosSettings]):
         self._begin(trainer)
         self._keep_cameras(capture, trainer)
         yield from self._trained(trainer, pictures)
+        given = {name: self._pictures(views, pictures) for name, views in self._scored().items()}
+        tests = given
         if trainer.poses is not None:
+            tests = yield from self._placed(trainer, given)
+            pictures = pictures.placed([trainer.camera(k) for k in range(len(pictures.views))])
             self._keep_cameras(capture, trainer)
         splats = trainer.parameters.drawn
-        drawn = trainer.renderer.settings
+        self._save_scene(trainer)
+        for name, test in tests.items():
+            self.scores[name] = []
+            for score in score_views(
+                *(trainer.renderer, splats, test, pictures),
+                given=None if trainer.poses is None else given[name].cameras,
+                exposed=trainer.exposures is not None,
+            ):
+                self.scores[name].append(score)
+                yield Report(len(self.scores[name]), len(test.views), f"views of {name}")
+                self._heed(trainer.parameters.step)
+        self.scores = {name: scores for name, scores in self.scores.items() if scores}
+        self.metrics = {
+            "splats": len(splats),
+            "loss": self.losses[-1][1],
+            "history": self._history,
+            "background": pictures.behind.tolist(),
+            **settings.basis_facts(),
+            **({} if trainer.octaves is None else {"octaves": trainer.octaves.facts()}),
+            **pose_record(trainer),
+            **exposure_record(trainer, self.training_views, self.scores),
+            **score_record(self.scores),
+            **compared_record(self.scores),
+            **error_record(self.scores),
+        }
+        ramp = ramp_notes(settings, len(self.training_views))
+        held_out = self.scores.get(_HELD_OUT, [])
+        doubts = [
+            *comparison_notes(self.scores),
+            *brightness_notes(held_out),
+            *doubt_notes(held_out),
+        ]
+        refined = [*pose_notes(self.metrics), *exposure_notes(self.metrics)]
+        for note in [*refined, *doubts]:
+            self.announce(f"rift: {note}")
+        octaves = octave_notes(self.metrics)
+        history = history_notes(self._history)
+        notes = [*self._notes(), *octaves, *ramp, *refined, *history, *doubts]
+        scene = leave_page(settings.out, pictures, self.announce)
+        name = capture_name(settings.capture)
+        page = fit_page(name, self.scores, self.losses, self.metrics, notes, scene)
+        self.folder.finish(
+            self.settled, self.metrics, page, self.device, asked=settings, **self.decided
+        )
+
+    def _placed(
+        self, trainer: Trainer, given: Mapping[str, CapturePictures]
+    ) -> Generator[Report, None, dict[str, CapturePictures]]:
+        """The pictures that are scored, by cameras that are refined against them."""
+        placed = {}
+        for name, test in given.items():
+            cameras = list[Camera]()
+            for camera in placed_cameras(trainer, test):
+                cameras.append(camera)
+                yield Report(len(cameras), len(test.views), f"poses of {name}")
+                self._heed(trainer.parameters.step)
+            placed[name] = test.placed(cameras)
+        if self.test_views:
+            self.test_views = with_poses(self.test_views, placed[_HELD_OUT].cameras)
+        return placed
+
+    def _save_scene(self, trainer: Trainer) -> None:
+        """Leave the splats, and the light that they share, in the folder."""
+        settings, drawn = self.settings, trainer.renderer.settings
         fitted = SplatScene.of(
-            splats,
+            trainer.parameters.drawn,
             self.device,
             activation=drawn.activation,
             angular=drawn.angular,
@@ -246,42 +323,6 @@ class Fit(FitRun[FitPhotosSettings]):
             display = settings.light == "display"
             path = settings.out / "environment.exr"
             write_environment_map(path, fitted.environment, display=display)
-        for name, views in self._scored().items():
-            self.scores[name] = []
-            test = self._pictures(views, pictures)
-            for score in score_views(trainer.renderer, splats, test, pictures):
-                self.scores[name].append(score)
-                yield Report(len(self.scores[name]), len(views), f"views of {name}")
-                self._heed(trainer.parameters.step)
-        self.scores = {name: scores for name, scores in self.scores.items() if scores}
-        self.metrics = {
-            "splats": len(splats),
-            "loss": self.losses[-1][1],
-            "history": self._history,
-            "background": pictures.behind.tolist(),
-            **settings.basis_facts(),
-            **({} if trainer.octaves is None else {"octaves": trainer.octaves.facts()}),
-            **score_record(self.scores),
-            **compared_record(self.scores),
-            **error_record(self.scores),
-        }
-        ramp = ramp_notes(settings, len(self.training_views))
-        held_out = self.scores.get("held out", [])
-        doubts = [
-            *comparison_notes(self.scores),
-            *brightness_notes(settings, held_out),
-            *doubt_notes(held_out),
-        ]
-        for note in doubts:
-            self.announce(f"rift: {note}")
-        octaves = octave_notes(self.metrics)
-        notes = [*self._notes(), *octaves, *ramp, *history_notes(self._history), *doubts]
-        scene = leave_page(settings.out, pictures, self.announce)
-        name = capture_name(settings.capture)
-        page = fit_page(name, self.scores, self.losses, self.metrics, notes, scene)
-        self.folder.finish(
-            self.settled, self.metrics, page, self.device, asked=settings, **self.decided
-        )
 
     def _read_ahead(self, trainer: Trainer, pictures: CapturePictures) -> Iterator[Report]:
         """Read the photographs that the steps will ask for, so that the first are as fast as all.
@@ -390,5 +431,5 @@ class Fit(FitRun[FitPhotosSettings]):
 
     def _scored(self) -> dict[str, tuple[View, ...]]:
         """The pictures that are scored, by the name of their group."""
-        groups = {"held out": self.test_views} if self.test_views else {}
+        groups = {_HELD_OUT: self.test_views} if self.test_views else {}
         return groups | {name: capture.views for name, capture in self.tests.items()}

@@ -13,6 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
+from copy import copy
 from dataclasses import replace
 from typing import Any, NamedTuple
 
@@ -106,6 +107,12 @@ class CapturePictures:
             background = self.border if like is None else like.behind
         self.behind: Floats = np.zeros(3, np.float32) if background is None else background
         self._step = 0
+
+    def placed(self, cameras: Sequence[Camera]) -> CapturePictures:
+        """The same photographs, taken by other cameras, one for each."""
+        others = copy(self)
+        others.cameras = cameras
+        return others
 
     def image(self, number: int) -> Floats:
         """(height, width, 3), or 4 with the photograph's own alpha, straight."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from functools import partial
+from itertools import compress
 from typing import Any
 
 import numpy as np
@@ -33,7 +34,11 @@ SCORING = (
     f"{SCORING_ALONE} 'nearest' and 'blend' are the nearest training picture and the mean of the "
     "two nearest: what no fit scores. Means beside each other are over the same pictures."
 )
-COLUMNS = ("pictures", "score", *COMPARED)
+_AS_GIVEN = (
+    " 'fit' is drawn with the poses and exposures that were fitted to the scored pictures "
+    "themselves, 'as given' without."
+)
+COLUMNS = ("pictures", "score", "fit", "as given", *COMPARED[2:])
 # Kinds of scores and what tables call them.
 SCORES = {
     "psnr": "PSNR",
@@ -55,6 +60,15 @@ def score_rows(metrics: Mapping[str, Any]) -> list[tuple[Any, ...]]:
         for kind, label in SCORES.items()
         if kind in kinds
     ]
+
+
+def score_table(metrics: Mapping[str, Any]) -> tuple[Sequence[str], list[tuple[Any, ...]], str]:
+    """Columns and rows of mean scores, and a caption; without what nothing is compared with."""
+    rows = score_rows(metrics)
+    known = [True, True, *(any(row[k] is not None for row in rows) for k in range(2, len(COLUMNS)))]
+    caption = SCORING if all(known[-2:]) else SCORING_ALONE
+    caption += _AS_GIVEN if known[3] else ""
+    return list(compress(COLUMNS, known)), [tuple(compress(row, known)) for row in rows], caption
 
 
 def fit_page(
@@ -109,11 +123,11 @@ def octave_notes(metrics: Mapping[str, Any]) -> list[str]:
     ]
 
 
-def brightness_notes(settings: FitPhotosSettings, scores: Sequence[ViewScore]) -> list[str]:
+def brightness_notes(scores: Sequence[ViewScore]) -> list[str]:
     """A sentence about exposures that change, where they were not fitted."""
     spread, explained = brightness_of(scores)
-    steady = spread < _STEADY or explained < _EXPLAINED
-    if settings.training.refine_exposures or steady:
+    fitted = any(score.exposure is not None for score in scores)
+    if fitted or spread < _STEADY or explained < _EXPLAINED:
         return []
     return [
         f"The held-out photographs are brighter or darker than the fit by {100 * spread:.0f} % "
@@ -159,7 +173,8 @@ def show_fit(
         show_views(page, scores, "fit")
     if metrics["scores"]:
         page.section("Scores")
-        page.table(COLUMNS, score_rows(metrics), caption=SCORING)
+        columns, table, caption = score_table(metrics)
+        page.table(columns, table, caption=caption)
     for group, scores in groups.items():
         rows = [_row(score) for score in scores]
         columns = ("picture", "degrees away", "PSNR", "SSIM", "blend PSNR")

@@ -27,6 +27,7 @@ from rift_cl.geometry import Camera
 from rift_cl.metrics import psnr, ssim
 from rift_cl.splat.renderer import Renderer
 from rift_cl.splat.splats import Splats
+from rift_cl.train.per_view.exposures import fitted_exposure
 from rift_cl.train.start.points import focus_of
 
 Floats = NDArray[np.float32]
@@ -51,6 +52,8 @@ class ViewScore:
         distance: to the nearest training camera over that to the focus; NaN where it is not known.
         places: where the picture errs; None of X-rays.
         counted: (height, width) the pixels that count; None for all.
+        exposure: (2, 3) gain and offset of each colour that ``image`` was given to fit the truth;
+            None where it is as it was drawn.
     """
 
     name: str
@@ -62,6 +65,7 @@ class ViewScore:
     distance: float = math.nan
     places: ErrorPlaces | None = None
     counted: Mask | None = None
+    exposure: NDArray[np.float64] | None = None
 
 
 def score_views(
@@ -70,15 +74,32 @@ def score_views(
     test: CapturePictures,
     training: CapturePictures | None,
     more: Mapping[str, Score] | None = None,
+    *,
+    given: Sequence[Camera] | None = None,
+    exposed: bool = False,
 ) -> Iterator[ViewScore]:
     """Render and score every picture of ``test``.
 
-    What a mask leaves nothing of is left out. ``training`` are the ones that were trained on;
-    without them there are no angles, no distances and no baselines. ``more`` are scores by name
-    besides PSNR and SSIM.
+    What a mask leaves nothing of is left out. Where a pose or an exposure is fitted to a picture,
+    what is drawn without them is scored as well, and these scores are called "given".
+
+    Args:
+        renderer: of the splats.
+        splats: what is scored.
+        test: the pictures.
+        training: those that were trained on; without them there are no angles, no distances and no
+            baselines.
+        more: scores by name besides PSNR and SSIM.
+        given: cameras of ``test`` as they were given, where it has others.
+        exposed: whether what is drawn is given the gains and offsets that fit the picture best.
     """
     cameras = (training or test).cameras
     behind, focus, up = test.behind, focus_of(cameras), common_up(cameras)
+
+    def drawn(camera: Camera) -> Floats:
+        background = renderer.device.array(behind)
+        return renderer.picture(splats, camera, background=background).image
+
     for number, camera in enumerate(test.cameras):
         counted, foreground = test.counted(number), test.foreground(number)
         if counted is not None and not counted.any():
@@ -89,10 +110,16 @@ def score_views(
             continue
         # A lens may well leave nothing out.
         masks = None if counted is None or counted.all() else counted, foreground
-        drawn = renderer.picture(splats, camera, background=renderer.device.array(behind))
-        image = test.shown(drawn.image)
-        truth = test.shown(test.over(number, behind))
+        photograph, image, exposure = test.over(number, behind), drawn(camera), None
+        truth = test.shown(photograph)
+        plain = image if given is None else drawn(given[number])
+        if exposed:
+            exposure = fitted_exposure(image, photograph, masks[0])
+            image = (exposure[0] * image + exposure[1]).astype(np.float32)
+        image = test.shown(image)
         values, angle, distance = scores_of(image, truth, masks, "fit", more), math.nan, math.nan
+        if exposed or given is not None:
+            values |= scores_of(test.shown(plain), truth, masks, "given", more)
         if training is not None:
             angles = _angles(training.cameras, camera, focus)
             angle, distance = float(angles.min()), _distance(training.cameras, camera, focus)
@@ -101,7 +128,9 @@ def score_views(
         elevation = math.nan if up is None else angles_of(camera, focus, up)[1]
         places = ErrorPlaces.of(image, truth, *masks)
         name = test.views[number].name
-        yield ViewScore(name, angle, values, truth, image, elevation, distance, places, masks[0])
+        yield ViewScore(
+            name, angle, values, truth, image, elevation, distance, places, masks[0], exposure
+        )
 
 
 def scores_of(

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rift_cl.commands.fit_photos.scores import ViewScore
-from rift_cl.commands.fit_xray.scores import COLUMNS, SCORING, score_rows
+from rift_cl.commands.fit_xray.scores import score_table
 from rift_cl.commands.pictures.evenly_spaced import evenly
 from rift_cl.commands.pictures.slice_pictures import (
     ENOUGH,
@@ -54,7 +54,8 @@ def xray_page(
     _show_slices(page, *slices, unit or "unit of length")
     if metrics["scores"]:
         page.section("Scores")
-        page.table(COLUMNS, score_rows(metrics), caption=SCORING)
+        columns, rows, caption = score_table(metrics)
+        page.table(columns, rows, caption=caption)
     for group, scores in groups.items():
         _show_projections(page, group, scores)
     page.section("Training")

@@ -9,7 +9,7 @@ the difference over that of the truth.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -49,13 +49,14 @@ COLUMNS = ("pictures", "score", "fit", "fbp", "blend")
 Floats = NDArray[np.float32]
 
 
-def score_rows(metrics: Mapping[str, Any]) -> list[tuple[Any, ...]]:
-    """The table of mean scores."""
-    return [
+def score_table(metrics: Mapping[str, Any]) -> tuple[Sequence[str], list[tuple[Any, ...]], str]:
+    """Columns and rows of mean scores, and a caption."""
+    rows = [
         (group, label, *(values[f"{name}_{kind}"] for name in COLUMNS[2:]))
         for group, values in metrics["scores"].items()
         for kind, label in (("psnr", "PSNR"), ("error", "error"))
     ]
+    return COLUMNS, rows, SCORING
 
 
 def backprojected(device: Device, training: Projections, filter: str = "ram-lak") -> Floats:

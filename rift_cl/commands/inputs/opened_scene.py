@@ -100,6 +100,11 @@ class OpenedScene:
         """Whether the fit took every lens for a pinhole, so that blur is in the splats."""
         return self._settings is not None and self._settings.flag("pinhole")
 
+    def refined(self, what: str) -> bool:
+        """Whether the fit refined "poses" or "exposures"."""
+        training = None if self._settings is None else self._settings.values.get("training")
+        return isinstance(training, dict) and training.get(f"refine_{what}") is True
+
     @cached_property
     def cameras(self) -> FitCameras | None:
         """Those that the fit knows; None where there is no fit, or an older version's.

@@ -18,6 +18,8 @@ from rift_cl.cl.device import Device
 from rift_cl.train.per_view.host_adam import HostAdam
 
 _COLORS = 3
+# Variance of a colour, in squares of a code of 16 bits or so, above which it tells a gain.
+_TELLS = 2.0**-32
 
 Arrays = Mapping[str, NDArray[np.float64]]
 
@@ -49,6 +51,21 @@ class Exposures:
         self, image: DeviceArray, by_exposed: DeviceArray, number: int, rate: float
     ) -> DeviceArray:
         """The gradient by the image, of that by the exposed one; takes a step with the exposure."""
+        by_image, parts = self._gradients(image, by_exposed, number)
+        gradient = self.device.get(sum_columns(self.device, parts)).astype(float)
+        step = self._adam.step(number, gradient.reshape(2, _COLORS), rate)
+        self.values[number] -= step
+        self.values -= self.values.mean(axis=0) - [[1.0] * _COLORS, [0.0] * _COLORS]
+        return by_image
+
+    def gradient(self, image: DeviceArray, by_exposed: DeviceArray, number: int) -> DeviceArray:
+        """The gradient by the image, of that by the exposed one; the exposure stays."""
+        return self._gradients(image, by_exposed, number)[0]
+
+    def _gradients(
+        self, image: DeviceArray, by_exposed: DeviceArray, number: int
+    ) -> tuple[DeviceArray, DeviceArray]:
+        """By the image, and what each pixel adds to that by gains and offsets, (pixels, 6)."""
         by_image, size = self.device.empty(image.shape), image.size // _COLORS
         parts = self.device.empty((size, 2 * _COLORS))
         self.device.launch(
@@ -61,11 +78,7 @@ class Exposures:
             gain=self._row(number)[0],
             pixels=size,
         )
-        gradient = self.device.get(sum_columns(self.device, parts)).astype(float)
-        step = self._adam.step(number, gradient.reshape(2, _COLORS), rate)
-        self.values[number] -= step
-        self.values -= self.values.mean(axis=0) - [[1.0] * _COLORS, [0.0] * _COLORS]
-        return by_image
+        return by_image, parts
 
     def _row(self, number: int) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
         # OpenCL's three-vectors are four floats wide.
@@ -81,3 +94,32 @@ class Exposures:
         """Go on from a checkpoint."""
         self.values = np.array(state["values"])
         self._adam.restore(state)
+
+
+def fitted_exposure(
+    image: NDArray[np.float32],
+    target: NDArray[np.float32],
+    counted: NDArray[np.bool_] | None = None,
+) -> NDArray[np.float64]:
+    """Gain and offset of each colour that bring an image next to a photograph, by least squares.
+
+    Args:
+        image: (height, width, 3) as it is drawn.
+        target: (height, width, 3) photograph.
+        counted: (height, width) the pixels that count; None for all.
+
+    Returns:
+        (2, 3) gains, none of them below zero, and offsets. The gain is one where the image tells
+        none, being of one colour.
+    """
+    drawn, wanted = (
+        (array.reshape(-1, _COLORS) if counted is None else array[counted]).astype(np.float64)
+        for array in (image, target)
+    )
+    if not len(drawn):
+        return np.array([[1.0] * _COLORS, [0.0] * _COLORS])
+    middle, away = drawn.mean(axis=0), drawn - drawn.mean(axis=0)
+    square, product = np.sum(away**2, axis=0), np.sum(away * wanted, axis=0)
+    told = square > _TELLS * len(drawn)
+    gain = np.where(told, np.maximum(product, 0) / np.where(told, square, 1), 1.0)
+    return np.stack([gain, wanted.mean(axis=0) - gain * middle])

@@ -3,8 +3,8 @@
 A pose moves by small turns and shifts in its own camera's frame, view <- exp(twist) view. With
 G = dL/d(upper rows of view), the gradient by the shift is G's last column, and by a turn about axis
 a it is the sum of G times (a x each column of view). Steps are Adam's, a rate for turns in radians
-and one for shifts in the scene's unit. The common motion of all cameras, which the splats could
-follow as well, is not taken out.
+and one for shifts in the scene's unit. The common motion of all cameras, which the splats follow,
+is not taken out: ``Poses.common_motion`` tells it.
 """
 
 from __future__ import annotations
@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from rift_cl.geometry import Camera
+from rift_cl.geometry.common_motion import Similarity, common_motion
 from rift_cl.train.per_view.host_adam import HostAdam
 
 Floats = NDArray[np.float64]
@@ -31,7 +32,7 @@ class Poses:
 
     def __init__(self, cameras: Sequence[Camera], extent: float) -> None:
         self._given = cameras
-        self._extent = extent
+        self.extent = extent
         self.views = np.array([camera.view for camera in cameras])
         self._adam = HostAdam((len(cameras), 6))
 
@@ -49,7 +50,7 @@ class Poses:
             rate: of turns, in radians; shifts go as far times the extent.
         """
         twist = twist_gradient(self.views[number], by_view)
-        rates = np.repeat([rate, rate * self._extent], 3)
+        rates = np.repeat([rate, rate * self.extent], 3)
         step = -self._adam.step(number, twist, rates)
         if not step.any():
             return
@@ -66,6 +67,15 @@ class Poses:
         turned = Rotation.from_matrix(self.views[:, :3, :3] @ back).magnitude()
         away = np.linalg.norm(_centers(self.views) - _centers(given), axis=1)
         return np.stack([turned, away], axis=1)
+
+    def common_motion(self, ahead: float) -> Similarity:
+        """What all cameras have moved by, which the splats have followed.
+
+        Args:
+            ahead: distance of what the cameras look at.
+        """
+        cameras = [self.camera(number) for number in range(len(self._given))]
+        return common_motion(self._given, cameras, ahead)
 
     def state(self) -> dict[str, Floats]:
         """What a checkpoint keeps."""

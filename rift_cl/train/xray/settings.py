@@ -36,7 +36,7 @@ class XrayLearningRates(LearningRates):
     logits: float = 2e-2
     sh: NoOption[float] = 0.0
     sh_rest: NoOption[float] = 0.2
-    poses: NoOption[float] = 1e-3
+    pose_reach: NoOption[float] = 0.02
     exposures: NoOption[float] = 1e-2
     color_modes: NoOption[float] = 2.5e-3
     lobes: NoOption[float] = 1e-2
