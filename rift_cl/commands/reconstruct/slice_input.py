@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from rift_cl.cl.device import Device
 from rift_cl.commands.inputs.axis_alignment import Alignment
+from rift_cl.commands.inputs.beam_level import beam_level
 from rift_cl.commands.inputs.row_doubts import row_doubts
 from rift_cl.commands.inputs.scan_axis import (
     SettledAxis,
@@ -206,6 +207,8 @@ class SliceInput:
         # What one side of the detector misses is no truncation where the other side has it.
         measured = row if self.settings.iterative else self._both_sides(row)[0]
         wanted = self.settings.pad == "auto" and is_truncated(measured) and not self.offset
+        # Air that is off zero is no object that goes on.
+        wanted = wanted and beam_level(read.projections[:, 0]) is None
         self.beyond = self.offset and is_truncated(row, self.geometry.center)
         if wanted or self.settings.pad == "on":
             self.pad = max(1, self.scan.shape[2] // _PAD_SHARE)
@@ -525,14 +528,18 @@ def _offset_note(source: SliceInput) -> str:
 
 def _wide_note(source: SliceInput) -> str:
     wide = "The object is wider than the detector (--pad)"
+    inside = (
+        "Inside it, what lies beyond leaves the level of values uncertain by a smooth error, often "
+        "of 10 % and more (the interior problem)."
+    )
     if source.settings.iterative:
         return (
             f"{wide}: slices were computed with a margin of {source.pad} bins on each side, whose "
-            "values are an extrapolation."
+            f"values are an extrapolation, as are all outside the field of view. {inside}"
         )
     return (
         f"{wide}: projections were extrapolated smoothly beyond its ends; values outside the "
-        "field of view are not measured."
+        f"field of view are not measured. {inside}"
     )
 
 
