@@ -106,7 +106,10 @@ WRONG = {
         "the beam flickered by [78].* % from view to view",
     ),
     "little weaker beam": (lambda lines: frames(lines, 0.95 * BEAM), "ends .* read 0.05"),
-    "two flats": (_two_flats, "the flats read two levels, .* and .* above the darks, and no file"),
+    "two flats": (
+        _two_flats,
+        "the flats read two levels, .* and .* above the darks, and nothing tells when",
+    ),
     "weaker beam": (lambda lines: frames(lines, 0.7 * BEAM), "ends of the detector read 0.35"),
     "saturated": (_saturated, "100 % of the detector's pixels read 65535"),
 }

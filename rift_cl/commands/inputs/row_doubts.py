@@ -144,8 +144,8 @@ def _two_levels(scan: ScanFile, rows: ScanRows) -> list[str]:
         return []
     return [
         f"Doubt: the flats read two levels, {low.mean():.4g} and {high.mean():.4g} above the "
-        "darks, and no file tells when they were taken: they were averaged, as if the beam had "
-        "been the same in all views."
+        "darks, and nothing tells when they were taken: one mean of them was taken for all views, "
+        "as if the beam had not changed."
     ]
 
 
