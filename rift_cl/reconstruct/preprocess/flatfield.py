@@ -32,8 +32,8 @@ _DEAD = 0.05
 # Fewer quanta than this share of the beam are not told from none, whatever the darks' noise.
 _FAINTEST = 1e-7
 # Flats or darks from which on an outlier among them can be told, and from which on the median
-# deviation of a pixel, one over 1.48 of the standard deviation, tells their spread; an outlier is so
-# many standard deviations away.
+# deviation of a pixel tells their spread; how many standard deviations an outlier is away, of which
+# a median deviation is one over 1.48.
 _ENOUGH_FRAMES, _MANY_FRAMES, _OUTLIER, _SIGMAS = 3, 5, 8.0, 1.48
 # Views and angle from which on a pixel that reads the same in all of them is told, and by how much
 # it may vary, as a share of what its row spans.
