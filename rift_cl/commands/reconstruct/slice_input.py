@@ -466,9 +466,10 @@ def _pitch_note(source: SliceInput) -> list[str]:
         return ["No distance between detector bins is known (--pitch): lengths are in bins."]
     if given is None or own is None or math.isclose(given, own, rel_tol=1e-6):
         return []
-    alike = "" if source.file.aspect == 1 else "; the distance between rows changes alike"
+    alike = source.file.aspect != 1 and source.settings.row_pitch is None
     return [
-        f"--pitch {given:g} {unit} takes the place of {own:.4g} {unit}, which the file says{alike}."
+        f"--pitch {given:g} {unit} takes the place of {own:.4g} {unit}, which the file says"
+        f"{'; the distance between rows changes alike' if alike else ''}."
     ]
 
 
