@@ -221,7 +221,9 @@ class SliceInput:
         """What the data have against the angles, and against an axis that was given."""
         given = self.settings.center
         if self.fan is not None:
-            return [] if given is None else doubted_circle(self.file, given, self.device)
+            if given is None:
+                return []
+            return doubted_circle(self.file, given, self.device, zingers=self.settings.zingers)
         block = row_binning(self.file, self.settings.binning)
         middle = binned_center((self.file.shape[1] - 1) / 2, block)
         return doubted_parallel(
@@ -232,6 +234,7 @@ class SliceInput:
             away=block * (sum(self.rows) // 2 - middle),
             spanned=self.spanned,
             device=self.device,
+            zingers=self.settings.zingers,
         )
 
     @property
@@ -257,12 +260,13 @@ class SliceInput:
 
     def _find_axis(self) -> None:
         """Find the axis, of a fan the sense of rotation too."""
-        geometry = self.file.geometry
+        geometry, zingers = self.file.geometry, self.settings.zingers
         if isinstance(geometry, Fan):
-            self.settled_by = settled_axis(self.file, geometry.center, self.device)
+            center = geometry.center
+            self.settled_by = settled_axis(self.file, center, self.device, zingers=zingers)
             self.center, self.turned = self.settled_by.center, self.settled_by.turned
             return
-        self.estimate = find_axis(self.file, self.device)
+        self.estimate = find_axis(self.file, self.device, zingers=zingers)
         self.center = self.estimate.center
         if self.settings.tilt is None:
             self.tilt = tilt_worth_turning(self.estimate, self.file.shape[1])
