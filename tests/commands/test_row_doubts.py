@@ -160,6 +160,19 @@ def test_an_object_that_reaches_both_ends_is_no_weak_beam(lines, tmp_path, capsy
     assert "a smooth error" in told
 
 
+@pytest.mark.parametrize("way", ["off", "cut"])
+def test_a_background_is_advised_where_ends_of_line_integrals_are_air(lines, tmp_path, capsys, way):
+    noisy = lines + np.random.default_rng(0).normal(0, 0.005, lines.shape)
+    values = noisy + 0.2 if way == "off" else noisy[..., 30:-30]
+    path = tmp_path / "scan.npz"
+    np.savez(path, projections=values.astype(np.float32), angles=ANGLES)
+    words = ["reconstruct", str(path), "--out", str(tmp_path / "out"), "--kind", "attenuation"]
+    assert main([*words, "--center", str((values.shape[-1] - 1) / 2)]) == 0
+    told = capsys.readouterr().err
+    assert ("--background" in told) == (way == "off")
+    assert ("wider than the detector" in told) == (way == "cut")
+
+
 def test_an_axis_that_is_not_found_for_that_is_told_with_it(lines, tmp_path, capsys):
     made = _sample_in_flats(lines)
     with h5py.File(tmp_path / "scan.h5", "w") as file:

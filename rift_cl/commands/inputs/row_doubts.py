@@ -171,17 +171,17 @@ def _weak_beam(scan: ScanFile, lines: Floats) -> list[str]:
     if found is None:
         return []
     remedy = f"--background {found.bins} brings it to zero"
-    if found.constant:
-        level = float(found.levels.mean())
-        if scan.kind == "attenuation":
-            cause = "and air 0"
-        else:
-            cause = (
-                f"as where the beam was {'weaker' if level > 0 else 'stronger'} than in the flats"
-            )
+    level = float(found.levels.mean())
+    if found.constant and scan.kind == "attenuation":
         return [
-            f"Doubt: both ends of the detector read {level:.3g} in all views alike, {cause}: if "
-            f"they see nothing but air, {remedy}."
+            f"Both ends of the detector read {level:.3g} in all views alike, and air 0: if they "
+            f"see nothing but air, {remedy}."
+        ]
+    if found.constant:
+        weaker = "weaker" if level > 0 else "stronger"
+        return [
+            f"Doubt: both ends of the detector read {level:.3g} in all views alike, as where the "
+            f"beam was {weaker} than in the flats: if they see nothing but air, {remedy}."
         ]
     return [
         f"Doubt: the beam {found.change}, as both ends of the detector show, which see air: line "
