@@ -73,6 +73,12 @@ def test_a_beam_that_falls_is_told_by_how_much(fall, words):
     assert not found.constant and found.change == f"{words} from the first view to the last"
 
 
+def test_views_that_magnify_an_object_differently_hide_no_fall():
+    magnified = WHOLE * (1 + 0.04 * np.sin(2 * ANGLES))[:, None]
+    found = beam_level(counted(magnified, beam=1 - 0.1 * np.linspace(0, 1, VIEWS)))
+    assert found is not None and found.change.startswith("fell by")
+
+
 def test_a_jump_is_told_by_its_view():
     found = beam_level(counted(WHOLE, beam=np.where(np.arange(VIEWS) < 40, 1, 0.8)))
     assert found.change == "fell by 20 % at view 40"

@@ -22,8 +22,9 @@ _END = 1 / 20
 _OFF, _MOST = 0.01, 0.5
 _STRONG = 99.5
 # By how much of the level the two ends may differ, and each of them along its bins, from view to
-# view and in the mean; and what is left of the changes of a view's sum when the level is taken off.
-_ALIKE, _FLAT, _LEFT = 0.1, 0.02, 0.3
+# view and in the mean; and the least share of a level's changes that the means of views show: all
+# of them, but for what fans and cones magnify on its way round.
+_ALIKE, _FLAT, _LIFT = 0.1, 0.02, 0.3
 # Views over which differences are averaged before they are compared, at least and as a share.
 _BLUR, _BLUR_SHARE = 5, 1 / 20
 # Standard errors from which on a level is no noise.
@@ -94,7 +95,7 @@ def beam_level(lines: Floats) -> BeamLevel | None:
     level = _level(found, ends)
     if not _OFF * most < level <= _MOST * most or not _are_air(ends, level):
         return None
-    return found if found.constant or _explains(found, lines) else None
+    return found if found.constant or _lifts_all(found, lines) else None
 
 
 def _are_air(ends: Levels, level: float) -> bool:
@@ -115,11 +116,14 @@ def _are_air(ends: Levels, level: float) -> bool:
     )
 
 
-def _explains(found: BeamLevel, lines: Floats) -> bool:
-    """Whether views of a whole object sum up to the same, once the changing level is taken off."""
-    sums = lines.mean(axis=1, dtype=np.float64) - found.levels
-    left = max(float(_blurred(sums).var()) - found.noise, 0.0)
-    return left <= _LEFT**2 * float(found.levels.var())
+def _lifts_all(found: BeamLevel, lines: Floats) -> bool:
+    """Whether the mean of a view rises with the level of its ends, as all bins do with a beam's.
+
+    The more of an object lies beyond both ends, the less of it the detector sees: there it falls.
+    """
+    means = lines.mean(axis=1, dtype=np.float64)
+    shared = float(np.mean((means - means.mean()) * (found.levels - found.levels.mean())))
+    return shared > _LIFT * max(float(found.levels.var()) - found.noise, 0.0)
 
 
 def _level(found: BeamLevel, ends: Levels) -> float:
