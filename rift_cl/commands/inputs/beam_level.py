@@ -17,10 +17,9 @@ Floats = NDArray[np.float32]
 Levels = NDArray[np.float64]
 # Bins at each end, as a share of the detector.
 _END = 1 / 20
-# Least level that is worth a doubt, and the highest that is a beam's, as shares of the largest line
-# integral: of an object that covers the detector ends are either near that or steep.
-_OFF, _MOST = 0.01, 0.5
-_STRONG = 99.5
+# Least level that is worth a doubt, and the highest that is a beam's, as shares of this percentile
+# of the line integrals: of an object that covers the detector, ends are either near that or steep.
+_OFF, _MOST, _STRONG = 0.01, 0.5, 99.5
 # By how much of the level the two ends may differ, and each of them along its bins, from view to
 # view and in the mean; and the least share of a level's changes that the means of views show: all
 # of them, but for what fans and cones magnify on its way round.
@@ -62,13 +61,13 @@ class BeamLevel:
         view, last = np.arange(len(levels)), len(levels) - 1
         variance = max(float(levels.var()) - self.noise, 1e-12)
         slope, begin = np.polyfit(view, levels, 1)
-        line = (float((begin + slope * view).var()), _moved("fell", "rose", slope * last))
-        at, step = _step(levels)
-        share = at * (last + 1 - at) / len(levels) ** 2
-        jump = (share * step**2, f"{_moved('fell', 'rose', step)} at view {at}")
-        explained, words = max(line, (jump[0], jump[1]))
-        if explained >= _EXPLAINED * variance:
-            return words if words is not line[1] else f"{words} from the first view to the last"
+        line = float((begin + slope * view).var())
+        at, rise = _step(levels)
+        jump = rise**2 * at * (last + 1 - at) / (last + 1) ** 2
+        if max(line, jump) >= _EXPLAINED * variance:
+            if line >= jump:
+                return f"{_moved(slope * last)} from the first view to the last"
+            return f"{_moved(rise)} at view {at}"
         slow = _blurred(levels)
         if float(slow.var()) >= _SLOW * variance:
             return f"changed by {_percent(float(np.ptp(slow)))} % in the course of the views"
@@ -105,14 +104,19 @@ def _are_air(ends: Levels, level: float) -> bool:
         ends: line integrals, (2, angle, bin), from the outermost bin inwards.
         level: root mean square of the views' levels.
     """
-    half = ends.shape[2] // 2
+    count = ends.shape[2]
+    half = count // 2
     falls = ends[:, :, half:].mean(axis=2) - ends[:, :, :half].mean(axis=2)
     chance = _SURE * _bin_error(ends)
     if abs(falls.mean()) > _FLAT * level + chance:
         return False
-    return all(
-        _change(each) <= _ALIKE * level + chance
-        for each in (ends[0].mean(axis=1) - ends[1].mean(axis=1), *falls)
+    # Noise of a sample, by what bins of one view differ by: views may come in any order.
+    noise = float((ends - ends.mean(axis=1, keepdims=True)).var(axis=2, ddof=1).mean())
+    apart = ends[0].mean(axis=1) - ends[1].mean(axis=1)
+    of_fall = noise * (1 / half + 1 / (count - half))
+    room = _ALIKE * level + chance
+    return _change(apart, 2 * noise / count) <= room and all(
+        _change(fall, of_fall) <= room for fall in falls
     )
 
 
@@ -151,9 +155,10 @@ def _bin_error(ends: Levels) -> float:
     return float(np.sqrt(rough.var(axis=1).mean() / 2 / (2 * ends.shape[2])))
 
 
-def _change(apart: Levels) -> float:
-    """Root mean square of a difference over the views, less that of its noise."""
-    square = float(np.mean(_blurred(apart) ** 2)) - _variance(apart) / _window(apart)
+def _change(apart: Levels, noise: float) -> float:
+    """Root mean square of a difference over the views, less that of its noise of this variance."""
+    noise = min(noise, _variance(apart))
+    square = float(np.mean(_blurred(apart) ** 2)) - noise / _window(apart)
     return float(np.sqrt(max(square, 0.0)))
 
 
@@ -184,10 +189,9 @@ def _step(levels: Levels) -> tuple[int, float]:
     return int(after[best]), float(high[best] - low[best])
 
 
-def _moved(fell: str, rose: str, rise: float) -> str:
-    """A verb for a beam of which the line integrals in air rise."""
-    percent = 100 * (1 - np.exp(-rise))
-    return f"{fell if rise > 0 else rose} by {abs(percent):.2g} %"
+def _moved(rise: float) -> str:
+    """What a beam did of which the line integrals in air rise by so much."""
+    return f"{'fell' if rise > 0 else 'rose'} by {abs(100 * (1 - np.exp(-rise))):.2g} %"
 
 
 def _percent(difference: float) -> str:
