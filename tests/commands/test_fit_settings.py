@@ -38,6 +38,7 @@ OTHERS = {
     "hold_out": 3,
     "center": 3.5,
     "pitch": 0.5,
+    "row_pitch": 0.25,
     "noise": 0.5,
     "first_splats": 0.5,
     "strategy.grow_gradient": 0.5,

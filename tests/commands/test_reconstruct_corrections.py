@@ -8,6 +8,7 @@ import pytest
 
 import rift_cl as rift
 from rift_cl.commands.cli import main
+from rift_cl.commands.inputs.scan_axis import find_axis
 from rift_cl.io import read_volume
 
 INPUT = 3
@@ -267,6 +268,18 @@ def test_zingers_are_removed_and_counted_in_slabs_of_any_size(tmp_path, monkeypa
     metrics = json.loads((tmp_path / "mended/metrics.json").read_text())
     assert metrics["zingers"] == len(set(zip(*hits, strict=True)))
     assert "Zingers" in notes(tmp_path / "mended")
+
+
+def test_the_axis_is_searched_in_rows_without_zingers(tmp_path):
+    integrals = line_integrals()
+    hits = np.random.default_rng(5).random(integrals.shape) < 1e-3
+    path = write_counts(tmp_path / "scan.h5", integrals, lambda counts: counts + 4e4 * hits)
+    struck, mended = (find_axis(rift.open_scan(path), zingers=sigma) for sigma in (None, 6.0))
+    assert mended.center == pytest.approx(39.5, abs=0.01)
+    assert abs(struck.center - 39.5) > 0.05 and np.ptp(mended.interval) < np.ptp(struck.interval)
+    reconstruct(path, tmp_path / "out", "--zingers", 6, "--rows", 5, 6)
+    settings = json.loads((tmp_path / "out/config.json").read_text())["settings"]
+    assert settings["center"] == mended.center
 
 
 def test_a_scan_of_one_row_is_binned_along_its_bins(tmp_path):

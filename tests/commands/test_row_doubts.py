@@ -13,6 +13,8 @@ from rift_cl.commands.cli import main
 
 VIEWS, BINS, BEAM, DARK = 120, 96, 20000, 100
 ANGLES = np.arange(VIEWS) * np.pi / VIEWS
+# From 0 in the first view to 1 in the last.
+FALL = np.linspace(0, 1, VIEWS)[:, None, None]
 
 
 @pytest.fixture(scope="module")
@@ -73,6 +75,12 @@ def _saturated(lines):
     return {**made, "data": 4 * made["data"], "data_white": 4 * made["data_white"]}
 
 
+def _two_flats(lines):
+    made = frames(lines)
+    made["data_white"][4:] = 0.7 * (made["data_white"][4:]) + 0.3 * DARK
+    return made
+
+
 WRONG = {
     "no beam": (
         _dark_views,
@@ -83,6 +91,25 @@ WRONG = {
     "dark flats": (_dark_flats, "the flats read .* above the darks: some of them"),
     "sample in flats": (_sample_in_flats, "of row 1 is brighter than the open beam"),
     "stronger beam": (lambda lines: frames(lines, 1.6 * BEAM), "brighter than the open beam"),
+    "beam that fell": (
+        lambda lines: frames(lines, BEAM * (1 - 0.1 * FALL)),
+        "the beam fell by (9|10|11)(.[0-9])? % from the first view to the last",
+    ),
+    "beam that jumped": (
+        lambda lines: frames(lines, BEAM * np.where(FALL < 0.5, 1, 0.8)),
+        "the beam fell by (19|20|21) % at view 60",
+    ),
+    "beam that flickered": (
+        lambda lines: frames(
+            lines, BEAM * (0.9 + 0.1 * np.sin(1e3 * np.arange(VIEWS) ** 2)[:, None, None])
+        ),
+        "the beam flickered by [78].* % from view to view",
+    ),
+    "little weaker beam": (lambda lines: frames(lines, 0.95 * BEAM), "ends .* read 0.05"),
+    "two flats": (
+        _two_flats,
+        "the flats read two levels, .* and .* above the darks, and nothing tells when",
+    ),
     "weaker beam": (lambda lines: frames(lines, 0.7 * BEAM), "ends of the detector read 0.35"),
     "saturated": (_saturated, "100 % of the detector's pixels read 65535"),
 }
@@ -119,6 +146,31 @@ def test_the_remedy_that_is_named_ends_the_doubt(lines, tmp_path, capsys):
     weaker = frames(lines, 0.7 * BEAM)
     assert "--background 5 brings it to zero" in said(tmp_path, capsys, weaker)
     assert "Doubt" not in said(tmp_path, capsys, weaker, "--background", "5", "--overwrite")
+
+
+def test_air_that_is_off_zero_is_no_object_that_goes_on(lines, tmp_path, capsys):
+    fallen = frames(lines, BEAM * (1 - 0.4 * FALL))
+    assert "wider than the detector" not in said(tmp_path, capsys, fallen)
+
+
+def test_an_object_that_reaches_both_ends_is_no_weak_beam(lines, tmp_path, capsys):
+    cut = {name: values[..., 30:-30] for name, values in frames(lines).items()}
+    told = said(tmp_path, capsys, cut, "--center", str((BINS - 61) / 2))
+    assert "wider than the detector" in told and "Doubt" not in told
+    assert "a smooth error" in told
+
+
+@pytest.mark.parametrize("way", ["off", "cut"])
+def test_a_background_is_advised_where_ends_of_line_integrals_are_air(lines, tmp_path, capsys, way):
+    noisy = lines + np.random.default_rng(0).normal(0, 0.005, lines.shape)
+    values = noisy + 0.2 if way == "off" else noisy[..., 30:-30]
+    path = tmp_path / "scan.npz"
+    np.savez(path, projections=values.astype(np.float32), angles=ANGLES)
+    words = ["reconstruct", str(path), "--out", str(tmp_path / "out"), "--kind", "attenuation"]
+    assert main([*words, "--center", str((values.shape[-1] - 1) / 2)]) == 0
+    told = capsys.readouterr().err
+    assert ("--background" in told) == (way == "off")
+    assert ("wider than the detector" in told) == (way == "cut")
 
 
 def test_an_axis_that_is_not_found_for_that_is_told_with_it(lines, tmp_path, capsys):

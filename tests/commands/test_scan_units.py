@@ -9,6 +9,7 @@ import h5py
 import numpy as np
 import pytest
 
+from rift_cl.commands.center.settings import CenterSettings
 from rift_cl.commands.cli import main
 from rift_cl.commands.inputs.scan_lengths import with_lengths
 from rift_cl.errors import InputError
@@ -246,3 +247,42 @@ def test_phase_retrieval_in_another_unit_is_doubted(high: Path, tmp_path: Path) 
         assumed = json.loads((tmp_path / name / "metrics.json").read_text())["assumed"]
         doubts = [said for said in assumed if said.startswith("Doubt: photons of")]
         assert len(doubts) == (name == "eV")
+
+
+def heights(out: Path) -> tuple[float, ...]:
+    return read_volume_place(out / "volume.h5").spacing
+
+
+@pytest.mark.parametrize(
+    ("scan", "options", "spacing"),
+    [
+        ("bare", (), (2.5, 1, 1)),
+        ("bare", ("--pitch", 2, "--unit", "mm"), (2.5, 2, 2)),
+        ("bare", ("--pitch", 2, "--unit", "mm", "--binning", 2), (5, 4, 4)),
+        ("bare", ("--binning", 2), (5, 2, 2)),
+        ("metres", ("--unit", "um"), (2.5, 6.5, 6.5)),
+        ("metres", ("--unit", "um", "--pitch", 13), (2.5, 13, 13)),
+        ("high", (), (2.5, 0.1, 0.1)),
+        ("high", ("--unit", "um", "--pitch", 50), (2.5, 50, 50)),
+    ],
+)
+def test_rows_are_as_far_apart_as_a_person_says(request, tmp_path, scan, options, spacing):
+    path = request.getfixturevalue(scan)
+    assert run(path, tmp_path / "a", "--row-pitch", 2.5, *options) == 0
+    assert heights(tmp_path / "a") == pytest.approx(spacing)
+    told = " ".join(json.loads((tmp_path / "a" / "metrics.json").read_text())["assumed"])
+    assert ("--row-pitch 2.5 takes the place of" in told) == (scan == "high")
+    again = ("--config", tmp_path / "a" / "config.json", "--out", tmp_path / "b", "--quiet")
+    assert main([str(word) for word in ("reconstruct", *again)]) == 0
+    assert heights(tmp_path / "b") == pytest.approx(spacing)
+
+
+@pytest.mark.parametrize("length", [0, -1, float("nan"), float("inf")])
+def test_a_distance_between_rows_that_is_none_is_refused(bare, length):
+    with pytest.raises(InputError, match="--row-pitch is"):
+        with_lengths(open_scan(bare), None, None, length)
+
+
+def test_the_search_for_the_axis_takes_the_rows_so_far_apart(bare):
+    settings = CenterSettings(scan=bare, kind="attenuation", row_pitch=2.5)
+    assert settings.open_scan().aspect == 2.5

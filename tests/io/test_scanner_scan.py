@@ -104,6 +104,13 @@ def test_one_image_of_a_symmetric_sample(tmp_path: Path) -> None:
         open_scan(made.nikon(tmp_path / "more"), repeat=36)
 
 
+def test_a_beam_that_the_scanner_states_needs_no_flats_from_elsewhere(tmp_path: Path) -> None:
+    path = made.skyscan(tmp_path / "scan")
+    made.write_series(tmp_path / "flats", "f{}.tif", np.full((2, made.ROWS, made.BINS), 9000, "u2"))
+    assert open_scan(path).read(0, 1).flats is None
+    assert not any("outside" in note for note in open_scan(path).notes)
+
+
 def test_skyscan(tmp_path: Path) -> None:
     scan = open_scan(made.skyscan(tmp_path))
     cone = cone_of(scan)

@@ -11,7 +11,7 @@ import OpenImageIO
 import pytest
 import tiff_files as made
 
-from rift_cl.errors import InputError
+from rift_cl.errors import InputError, ShapeError
 from rift_cl.io import ScanFile, open_scan
 from rift_cl.io.scans.tiff_float64 import Float64Pages
 
@@ -194,8 +194,26 @@ def test_flats_and_darks_by_their_names(tmp_path: Path, way: str) -> None:
     scan = open_scan(folder)
     check_calibrated(scan)
     assert "flats from" in scan.source and "darks from" in scan.source
+    outside = [note for note in scan.notes if "outside the scan's folder" in note]
+    assert len(outside) == (2 if way == "folders beside" else 0)
     if way == "folders beside":
+        assert (
+            str(folder.parent / "flat") in outside[0] and str(folder.parent / "dark") in outside[1]
+        )
         check_calibrated(open_scan(folder.parent))
+        assert not any("outside" in note for note in open_scan(folder.parent).notes)
+
+
+def test_frames_of_another_size_outside_the_folder_are_passed_over(tmp_path: Path) -> None:
+    made.write_series(tmp_path / "scan", "p{}.tif", made.frames())
+    made.write_pages(tmp_path / "ff.tif", calibration("flats")[:, :-1])
+    scan = as_they_are(tmp_path / "scan")
+    (note,) = [note for note in scan.notes if "passed over" in note]
+    assert str(tmp_path / "ff.tif") in note and scan.read(0, 1).flats is None
+    inside = tmp_path / "scan" / "ff.tif"
+    (tmp_path / "ff.tif").rename(inside)
+    with pytest.raises(ShapeError, match="they must agree"):
+        open_scan(tmp_path / "scan")
 
 
 @pytest.mark.parametrize(

@@ -177,6 +177,17 @@ def test_every_method_treats_rows_by_themselves_and_keeps_level_data(clean, nois
     np.testing.assert_allclose(mended[:, 2], stack[:, 2], rtol=1e-5)
 
 
+def test_large_leaves_air_beside_a_steep_object_at_zero():
+    bin = np.arange(BINS) - (BINS - 1) / 2
+    disc = np.tile(0.02 * np.sqrt(np.maximum((0.95 * BINS / 2) ** 2 - bin**2, 0)), (VIEWS, 1))
+    mended = remove_rings(disc, method="large")
+    ends = np.flatnonzero(disc[0] == 0)
+    assert ends.size > 5
+    np.testing.assert_allclose(mended[:, ends], 0, atol=1e-3 * disc.max())
+    # The rim next to it as well, less the curvature of its profile.
+    np.testing.assert_allclose(mended[:, :25], disc[:, :25], atol=0.03 * disc.max())
+
+
 def test_large_brings_levels_together_unless_told_not_to(noisy):
     bad, _ = striped(noisy, "full")
     levels = [

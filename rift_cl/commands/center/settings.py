@@ -4,11 +4,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import ClassVar
+from typing import TYPE_CHECKING, ClassVar
 
 from rift_cl.commands.inputs.scan_input import ScanInput
 from rift_cl.commands.options import ResumableRun
-from rift_cl.option_marks import Auto
+from rift_cl.option_marks import Auto, AutoExpert
+
+if TYPE_CHECKING:
+    from rift_cl.io.scans.scan_file import ScanFile
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -23,6 +26,9 @@ class CenterSearch:
     row: Auto[int] = None
     """Detector row that the pictures show; the search uses several rows, whichever this is.
     Default: the middle row; of a cone beam that of the source's orbit."""
+    row_pitch: AutoExpert[float] = None
+    """Distance between detector rows, in the file's unit, or in bins where it has none; a tilt
+    depends on it. Default: that of the file, or that between bins."""
     out: Path = Path("rift-center")
     """Folder for report.html, with pictures and the score curve, config.json and metrics.json."""
 
@@ -35,3 +41,10 @@ class CenterSettings(ResumableRun, CenterSearch, ScanInput):
 
     Example: rift center scan.h5 --out center
     """
+
+    def open_scan(self, *, fan: bool = False) -> ScanFile:
+        """As of every command, with the distance between rows that is said."""
+        from rift_cl.commands.inputs.scan_lengths import with_row_pitch
+
+        scan = super().open_scan(fan=fan)
+        return scan if self.row_pitch is None else with_row_pitch(scan, self.row_pitch)

@@ -84,7 +84,10 @@ class XrayInput:
         opened = self.source.open_scan(fan=True)
         # Of cones --pitch is refused below.
         self.scan: ScanFile = with_lengths(
-            opened, settings.pitch if opened.cone is None else None, settings.unit
+            opened,
+            settings.pitch if opened.cone is None else None,
+            settings.unit,
+            settings.row_pitch,
         )
         if self.scan.fan is not None:
             raise InputError(

@@ -64,8 +64,10 @@ class XrayInput:
     """First detector row, and the one after the last, of parallel beams. Default: all rows."""
     pitch: Auto[float] = None
     """Distance between detector bins of parallel beams, in --unit; that between rows is scaled
-    alike, and is the same where a file does not say how high its pixels are. Default: the file's
-    own, or 1 bin."""
+    alike, unless --row-pitch says it. Default: the file's own, or 1 bin."""
+    row_pitch: AutoExpert[float] = None
+    """Distance between detector rows of parallel beams, in --unit. Default: the file's own, or that
+    between bins."""
     unit: Auto[str] = None
     """Unit of length of pitch, voxels and values: m, cm, mm, um, nm, pm, angstrom or inch. A file's
     lengths in another unit are converted to it. Default: the file's, or bin."""

@@ -9,6 +9,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from rift_cl.commands.inputs.beam_level import beam_level
 from rift_cl.io.scans.scan_file import ScanFile, ScanRows
 from rift_cl.reconstruct.preprocess.flatfield import Attenuation
 
@@ -24,11 +25,11 @@ _STARVED = 0.01
 _BRIGHT, _NEIGHBOURS, _BRIGHT_SHARE = 1.15, (5, 5), 0.02
 # Factor by which flats of one time may differ.
 _UNLIKE = 1.5
+# By how much of it flats of two levels differ at least, and how many times the differences within a
+# level.
+_TWO_LEVELS, _APART = 0.02, 4.0
 # Share of a detector's flat pixels at the largest code that tells of saturation.
 _FULL_SHARE = 0.02
-# Level of both ends of the detector that is worth a doubt, as a share of the largest line integral,
-# and by how much of it ends may differ from each other, from view to view and along their bins.
-_OFF, _ALIKE, _END = 0.03, 0.1, 1 / 20
 # Views over which both ends are averaged before they are compared, and by how much the difference
 # of ends that are taken for air may change over the views, as a share of the largest line integral.
 _BLUR, _CHANGE = 5, 0.05
@@ -44,15 +45,17 @@ def row_doubts(scan: ScanFile, row: int, found: Attenuation) -> list[str]:
         row: which.
         found: its line integrals, as they are worked on.
     """
+    lines = found.projections[:, 0]
     # Line integrals of others may be in any unit, and have no frames.
     if scan.kind == "attenuation":
-        return []
-    lines, frames = found.projections[:, 0], scan.read(row, row + 1)
+        return _weak_beam(scan, lines)
+    frames = scan.read(row, row + 1)
     told = _frames(frames) or _no_air(scan, lines, frames.flats is not None)
     # Counts over the mean of each view say nothing of the level of the beam.
     if frames.flats is not None or scan.kind == "transmission" or scan.background:
         told = told or _bright(lines, row) or _weak_beam(scan, lines)
-    return _dark_views(lines) + _open_views(lines) + _starved(found, row) + told
+    two = _two_levels(scan, frames)
+    return _dark_views(lines) + _open_views(lines) + _starved(found, row) + two + told
 
 
 def _dark_views(lines: Floats) -> list[str]:
@@ -124,6 +127,28 @@ def _frames(rows: ScanRows) -> list[str]:
     ]
 
 
+def _two_levels(scan: ScanFile, rows: ScanRows) -> list[str]:
+    """Flats of two times that nothing tells apart but the beam, which changed in between."""
+    flats = rows.flats
+    if flats is None or (scan.flats_at is not None and len(np.unique(scan.flats_at)) > 1):
+        return []
+    dark = 0.0 if rows.darks is None else float(np.median(rows.darks))
+    levels = np.sort(flats.mean(axis=(1, 2), dtype=np.float64) - dark)
+    if len(levels) < 2 or levels[0] <= 0 or levels[-1] > _UNLIKE * levels[0]:
+        return []
+    gaps = np.diff(levels)
+    widest = int(np.argmax(gaps))
+    low, high = levels[: widest + 1], levels[widest + 1 :]
+    within = max(float(np.ptp(low)), float(np.ptp(high)))
+    if gaps[widest] <= max(_TWO_LEVELS * high.mean(), _APART * within):
+        return []
+    return [
+        f"Doubt: the flats read two levels, {low.mean():.4g} and {high.mean():.4g} above the "
+        "darks, and nothing tells when they were taken: one mean of them was taken for all views, "
+        "as if the beam had not changed."
+    ]
+
+
 def _bright(lines: Floats, row: int) -> list[str]:
     """Samples that are brighter than the open beam."""
     from scipy.ndimage import uniform_filter
@@ -141,22 +166,26 @@ def _bright(lines: Floats, row: int) -> list[str]:
 
 
 def _weak_beam(scan: ScanFile, lines: Floats) -> list[str]:
-    """Both ends of the detector off zero by as much in all views and all their bins, as air is."""
-    # Of other kinds the scan's own notes say so.
-    if scan.background or scan.kind != "counts":
+    """Ends of the detector that see air, which is off zero in some views or in all."""
+    found = None if scan.background else beam_level(lines)
+    if found is None:
         return []
-    count = max(2, round(_END * lines.shape[1]))
-    ends = lines[:, :count], lines[:, -count:]
-    levels = [float(end.mean()) for end in ends]
-    level = sum(levels) / 2
-    if level <= _OFF * float(lines.max()) or abs(levels[0] - levels[1]) > _ALIKE * level:
-        return []
-    spreads = [end.mean(axis=axis).std() for end in ends for axis in (0, 1)]
-    if max(spreads) > _ALIKE * level:
-        return []
+    remedy = f"--background {found.bins} brings it to zero"
+    level = float(found.levels.mean())
+    if found.constant and scan.kind == "attenuation":
+        return [
+            f"Both ends of the detector read {level:.3g} in all views alike, and air 0: if they "
+            f"see nothing but air, {remedy}."
+        ]
+    if found.constant:
+        weaker = "weaker" if level > 0 else "stronger"
+        return [
+            f"Doubt: both ends of the detector read {level:.3g} in all views alike, as where the "
+            f"beam was {weaker} than in the flats: if they see nothing but air, {remedy}."
+        ]
     return [
-        f"Doubt: both ends of the detector read {level:.3g} in all views alike, as air does where "
-        f"the beam was weaker than in the flats: --background {count} brings it to zero."
+        f"Doubt: the beam {found.change}, as both ends of the detector show, which see air: line "
+        f"integrals are off by as much in each view; {remedy} in every view."
     ]
 
 

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -23,6 +25,13 @@ from rift_cl.reconstruct.axis.circular import axis_of_fan, axis_of_scan, orbit_r
 from rift_cl.reconstruct.axis.fan_doubt import sense_doubt
 from rift_cl.reconstruct.axis.lying_axis import looked_at, lying_axis
 from rift_cl.reconstruct.axis.search import GIVE_IT
+from rift_cl.reconstruct.preprocess import remove_zingers
+
+Floats = NDArray[np.float32]
+# Line integrals (angle, row, bin) from a row to the one before another.
+RowReader = Callable[[int, int], Floats]
+# Rows above and below that tell whether a pixel stands out.
+ZINGER_HALO = 1
 
 # A tilt is turned where it moves the axis by so many bins between the middle row and the first; one
 # that is not sure is told from so many times its standard error.
@@ -34,41 +43,59 @@ _LEAST_LIGHT = 1e-3
 
 
 def find_axis(
-    scan: ScanFile, device: Device | None = None, *, span: tuple[float, float] | None = None
+    scan: ScanFile,
+    device: Device | None = None,
+    *,
+    span: tuple[float, float] | None = None,
+    zingers: float | None = None,
 ) -> AxisEstimate:
     """Find the rotation axis of a scan.
 
     Reads a few rows, of a cone those next to the source's orbit, else evenly spread over the whole
-    detector whichever of them are wanted as slices, and uses their line integrals as they are:
-    rings do not turn with the object, so that they contradict every centre alike.
+    detector whichever of them are wanted as slices, and uses their line integrals as they are, less
+    zingers where they are to be removed: rings do not turn with the object, so that they contradict
+    every centre alike.
 
     Args:
         scan: the scan.
-        device: where rows of a detector that leans are turned upright; the default one if not
-            given. The search itself runs on the host.
+        device: where rows of a detector that leans are turned upright and zingers are removed; the
+            default one if not given. The search itself runs on the host.
         span: first and last bin between which to search; as for ``find_center`` if not given.
+        zingers: standard deviations from which on a pixel is one; None where they stay.
 
     Raises:
         InputError: the data do not tell the axis; the sentence names the file and says why.
         NonFiniteError: a sample is not finite.
     """
     geometry = scan.geometry
+    read = partial(_read_rows, scan, zingers, device)
     try:
         if scan.cone is not None:
-            return replace(_of_cone(scan, scan.cone, span, device), aspect=scan.aspect)
+            return replace(_of_cone(scan, scan.cone, span, device, read), aspect=scan.aspect)
         if isinstance(geometry, Fan):
             row = scan.shape[1] // 2
-            line = read_attenuation(scan, row, row + 1).projections[:, 0]
-            return axis_of_scan(line, geometry, span)
+            return axis_of_scan(read(row, row + 1)[:, 0], geometry, span)
         count = scan.shape[1]
         rows = searched_rows(count)
-        sinograms = (read_attenuation(scan, row, row + 1).projections[:, 0] for row in rows)
+        sinograms = (read(row, row + 1)[:, 0] for row in rows)
         found = axis_of_rows(sinograms, rows, count, scan.angles, span)
         return replace(found, aspect=scan.aspect)
     except InputError as error:
         if str(error).startswith(f"{scan.path}: "):
             raise  # of the file itself, which says so
         raise type(error)(f"{scan.path}: {error}") from error
+
+
+def _read_rows(
+    scan: ScanFile, zingers: float | None, device: Device | None, start: int, stop: int
+) -> Floats:
+    """Line integrals of some rows, (angle, row, bin), of which zingers are removed if asked for."""
+    if zingers is None:
+        return read_attenuation(scan, start, stop).projections
+    first, last = max(0, start - ZINGER_HALO), min(scan.shape[1], stop + ZINGER_HALO)
+    rows = read_attenuation(scan, first, last).projections
+    clean, _ = remove_zingers(rows, sigma=zingers, kind="attenuation", device=device)
+    return clean[:, start - first : stop - first]
 
 
 @dataclass(frozen=True)
@@ -90,13 +117,16 @@ class SettledAxis:
     notes: tuple[str, ...]
 
 
-def settled_axis(scan: ScanFile, center: float, device: Device | None = None) -> SettledAxis:
+def settled_axis(
+    scan: ScanFile, center: float, device: Device | None = None, *, zingers: float | None = None
+) -> SettledAxis:
     """Find the axis and the sense of rotation of a fan or a cone, and say what is done.
 
     Args:
         scan: the scan.
         center: bin of the axis that its file tells, or that is assumed.
         device: as for ``find_axis``.
+        zingers: as for ``find_axis``.
 
     Raises:
         NonFiniteError: a sample is not finite.
@@ -104,7 +134,7 @@ def settled_axis(scan: ScanFile, center: float, device: Device | None = None) ->
     middle = center == (scan.shape[2] - 1) / 2
     told = "the detector's middle" if middle else "the file"
     try:
-        found = find_axis(scan, device)
+        found = find_axis(scan, device, zingers=zingers)
     except InputError as error:
         reason = str(error).removeprefix(f"{scan.path}: ").replace(GIVE_IT, "")
         note = (
@@ -143,13 +173,15 @@ def doubted_center(found: AxisEstimate, given: float) -> list[str]:
     ]
 
 
-def doubted_circle(scan: ScanFile, given: float, device: Device | None = None) -> list[str]:
+def doubted_circle(
+    scan: ScanFile, given: float, device: Device | None = None, *, zingers: float | None = None
+) -> list[str]:
     """What the data of a fan or a cone have against their geometry and an axis that was given.
 
     Data that cannot be read here, or do not tell the axis, have nothing against one.
     """
     try:
-        found = find_axis(scan, device)
+        found = find_axis(scan, device, zingers=zingers)
     except RiftError:
         return []
     doubts = [f"Doubt: {found.doubt}."] if found.doubt else []
@@ -231,6 +263,7 @@ def _of_cone(
     cone: Cone | Vectors,
     span: tuple[float, float] | None,
     device: Device | None,
+    read_rows: RowReader,
 ) -> AxisEstimate:
     if not isinstance(cone, Cone) or not cone.circular:
         raise InputError(
@@ -239,7 +272,7 @@ def _of_cone(
         )
     groups = orbit_rows(cone)
     first, stop = int(groups[0][0]), int(groups[-1][-1]) + 1
-    read = _put_upright(scan, cone, first, stop, device)
+    read = _put_upright(scan, cone, first, stop, device, read_rows)
     rows = np.stack([read[:, group - first].mean(axis=1) for group in groups], axis=1)
     places = np.array([group.mean() for group in groups])
     lying = lying_axis(_integrals_but_flats(scan, *looked_at(cone)), cone)
@@ -250,20 +283,20 @@ def _of_cone(
 
 
 def _put_upright(
-    scan: ScanFile, cone: Cone, first: int, stop: int, device: Device | None
-) -> NDArray[np.float32]:
+    scan: ScanFile, cone: Cone, first: int, stop: int, device: Device | None, read_rows: RowReader
+) -> Floats:
     """Line integrals of some rows, turned where the file says that the axis leans.
 
     A row of a detector that leans sees the object's lower part at one end and its upper one at the
     other, which moves the axis that opposite rays tell.
     """
     if not scan.lean:
-        return read_attenuation(scan, first, stop).projections
+        return read_rows(first, stop)
     row, bin = cone.center
     turn = Alignment(bin, row, scan.lean, aspect=scan.aspect)
     halo = turn.halo(cone.bins)
     start = max(0, first - halo)
-    around = read_attenuation(scan, start, min(scan.shape[1], stop + halo)).projections
+    around = read_rows(start, min(scan.shape[1], stop + halo))
     return turn.aligned(around, start, slice(first - start, stop - start), device or open_device())
 
 

@@ -1,4 +1,4 @@
-"""Lengths of a scan in the unit that a person wants: ``--pitch``, ``--unit`` and a file's own.
+"""Lengths of a scan as a person wants them: ``--pitch``, ``--row-pitch``, ``--unit``, a file's own.
 
 A density per unit of length is wrong by a power of ten where a unit is. So a unit that is asked for
 converts what the file says in another one, names what the file says in none, and is refused where
@@ -18,21 +18,65 @@ from rift_cl.io.scans.scan_file import ScanFile, pitch_words
 BIN = "bin"
 
 
-def with_lengths(scan: ScanFile, pitch: float | None, unit: str | None) -> ScanFile:
+def with_lengths(
+    scan: ScanFile, pitch: float | None, unit: str | None, row_pitch: float | None = None
+) -> ScanFile:
     """The scan with its lengths in the unit that is asked for.
 
     Args:
         scan: as its file has it.
         pitch: distance between bins that takes the place of the file's, in ``unit``; or None.
         unit: of the lengths; the file's own if None.
+        row_pitch: distance between rows that takes the place of the file's, in ``unit``; or None.
 
     Returns:
-        The scan; its pitch is still that of the file, where that has one.
+        The scan; its pitch is still that of the file, where that has one, and that between rows is
+        to the file's as the one that was given is to ``pitch``.
 
     Raises:
-        InputError: the unit is none of length, it has no length to belong to, or the pitch has no
-            unit beside a file that has one.
+        InputError: the unit is none of length, it has no length to belong to, the pitch has no
+            unit beside a file that has one, or the one between rows is no length or is a cone's.
     """
+    scan = _in_unit(scan, pitch, unit)
+    return scan if row_pitch is None else with_row_pitch(scan, row_pitch, pitch)
+
+
+def with_row_pitch(scan: ScanFile, row_pitch: float, pitch: float | None = None) -> ScanFile:
+    """The scan with another distance between rows, which says what shape its pixels have.
+
+    Args:
+        scan: with its lengths in the unit of the others.
+        row_pitch: distance between rows.
+        pitch: that between bins where it takes the place of the scan's; or None.
+
+    Raises:
+        InputError: it is no length, or the scan is a cone's.
+    """
+    if not 0 < row_pitch < math.inf:
+        raise InputError(f"--row-pitch is {row_pitch:g}, wanted a length above 0")
+    if scan.cone is not None:
+        raise InputError(
+            f"--row-pitch is for parallel beams and fans, {scan.path} is a cone-beam scan: how "
+            "high its rows are is in its geometry (--geometry)"
+        )
+    notes = scan.notes
+    if scan.row_pitch is not None and not math.isclose(scan.row_pitch, row_pitch, rel_tol=1e-6):
+        length = f"{scan.row_pitch:.4g} {scan.unit}".rstrip()
+        note = f"--row-pitch {row_pitch:g} takes the place of {length}, which the file says."
+        notes = (*notes, note)
+    if pitch is None and scan.pitch is None:
+        note = (
+            "No distance between detector bins is known (--pitch): lengths, that of --row-pitch "
+            "too, are in bins."
+        )
+        notes = (*notes, note)
+    bins = scan.pitch or pitch or 1.0
+    rows = row_pitch * bins / (pitch or bins)
+    return dataclasses.replace(scan, pitch=bins, row_pitch=rows, notes=notes)
+
+
+def _in_unit(scan: ScanFile, pitch: float | None, unit: str | None) -> ScanFile:
+    """The scan with its lengths in a unit, its pitches still those of the file."""
     if unit is None:
         if pitch is not None and scan.unit:
             raise InputError(

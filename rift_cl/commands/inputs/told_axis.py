@@ -54,7 +54,12 @@ class ToldAxis:
 
 
 def axis_of_cone(
-    scan: ScanFile, center: float | None, tilt: float | None, device: Device | None = None
+    scan: ScanFile,
+    center: float | None,
+    tilt: float | None,
+    device: Device | None = None,
+    *,
+    zingers: float | None = None,
 ) -> ToldAxis:
     """The axis of a cone, its tilt and the sense of rotation, unless they are said.
 
@@ -63,6 +68,7 @@ def axis_of_cone(
         center: bin that a person says (--center).
         tilt: degrees that a person says (--tilt).
         device: as for ``find_axis``.
+        zingers: as for ``find_axis``.
 
     Raises:
         NonFiniteError: a sample is not finite.
@@ -70,13 +76,13 @@ def axis_of_cone(
     cone, rows, bins = scan.cone, *scan.shape[1:]
     lean = math.degrees(scan.lean) if tilt is None else tilt
     if center is not None:
-        doubts = tuple(doubted_circle(scan, center, device))
+        doubts = tuple(doubted_circle(scan, center, device, zingers=zingers))
         return ToldAxis(center, lean, False, {"center": center, "by": "--center"}, doubts)
     if not isinstance(cone, Cone):
         doubts = doubted_vectors(scan, cone) if isinstance(cone, Vectors) else ()
         record = {"center": (bins - 1) / 2, "by": "the vectors"}
         return ToldAxis(None, lean, False, record, doubts)
-    axis = settled_axis(scan, cone.center[1], device)
+    axis = settled_axis(scan, cone.center[1], device, zingers=zingers)
     notes = axis.notes
     if tilt is None and axis.found is not None:
         # What the file says of the lean is kept, unless the data are sure of another.
@@ -122,6 +128,7 @@ def doubted_parallel(
     away: float,
     spanned: int,
     device: Device | None = None,
+    zingers: float | None = None,
 ) -> list[str]:
     """What data of parallel rays have against their angles, and an axis that a person says.
 
@@ -133,11 +140,12 @@ def doubted_parallel(
         away: rows by which that row is beyond the detector's middle one.
         spanned: as for ``found_in_words``.
         device: as for ``find_axis``.
+        zingers: as for ``find_axis``.
     """
     found = None
     if center is not None:
         with suppress(RiftError):  # data that do not tell the axis have nothing against one
-            found = find_axis(scan, device)
+            found = find_axis(scan, device, zingers=zingers)
     doubt = angle_doubt(line, scan.angles) if found is None else found.doubt
     doubts = [f"Doubt: {doubt}."] if doubt else []
     if found is None or center is None:

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from rift_cl.cl.device import Device
 from rift_cl.commands.inputs.axis_alignment import Alignment
+from rift_cl.commands.inputs.scan_axis import ZINGER_HALO
 from rift_cl.commands.inputs.scan_rows import read_attenuation
 from rift_cl.commands.reconstruct.settings import ReconstructSettings
 from rift_cl.errors import InputError
@@ -33,8 +34,6 @@ Floats = NDArray[np.float32]
 _USUAL_RINGS = "vo"
 # Stripes are told from the object where views go round so far: a flat face is a stripe in fewer.
 _RINGS_FROM = np.deg2rad(150)
-# Rows above and below that tell whether a pixel stands out.
-_ZINGER_HALO = 1
 # Options of phase retrieval, all of which it needs.
 _PHASE = ("delta_beta", "energy", "propagation")
 
@@ -130,7 +129,7 @@ class CleanRows:
     def _halo(self) -> int:
         """Neighbouring rows that zinger removal and phase retrieval need."""
         halo = 0 if self.phase is None else self.phase.halo_rows()
-        return halo + (0 if self._settings.zingers is None else _ZINGER_HALO)
+        return halo + (0 if self._settings.zingers is None else ZINGER_HALO)
 
     def _without_zingers(self, rows: Floats, counted: slice) -> Floats:
         sigma = self._settings.zingers or 0.0

@@ -273,7 +273,10 @@ class ConeInput:
         """Bin of the axis on the detector as the file has it, and how it is known."""
         if self._axis_taken:
             return {"center": self.center, "by": "search"}
-        axis = axis_of_cone(self.file, self.settings.center, self.settings.tilt, self.device)
+        settings = self.settings
+        axis = axis_of_cone(
+            self.file, settings.center, settings.tilt, self.device, zingers=settings.zingers
+        )
         self.center, self.tilt, self.turned = axis.center, axis.tilt, axis.turned
         self.notes += axis.notes
         return axis.record

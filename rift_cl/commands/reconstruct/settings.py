@@ -124,8 +124,11 @@ class GeometryOptions:
     """First detector row and the one after the last; of cone beams, slices of the volume. Default:
     all."""
     pitch: Auto[float] = None
-    """Distance between detector bins, in --unit; that between rows is scaled alike, and is the same
-    where a file does not say how high its pixels are. Default: that of the file, or 1."""
+    """Distance between detector bins, in --unit; that between rows is scaled alike, unless
+    --row-pitch says it. Default: that of the file, or 1."""
+    row_pitch: AutoExpert[float] = None
+    """Distance between detector rows, in --unit. Default: that of the file, or that between
+    bins."""
     unit: Auto[str] = None
     """Unit of length of pitch, voxels and values: m, cm, mm, um, nm, pm, angstrom or inch. A file's
     lengths in another unit are converted to it. Default: that of the file, or bin."""
@@ -272,7 +275,7 @@ class ReconstructSettings(
         """As of every command, with lengths in the unit that is asked for."""
         from rift_cl.commands.inputs.scan_lengths import with_lengths
 
-        return with_lengths(super().open_scan(fan=fan), self.pitch, self.unit)
+        return with_lengths(super().open_scan(fan=fan), self.pitch, self.unit, self.row_pitch)
 
     @property
     def iterative(self) -> bool:

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from rift_cl.cl.device import Device
 from rift_cl.commands.inputs.axis_alignment import Alignment
+from rift_cl.commands.inputs.beam_level import beam_level
 from rift_cl.commands.inputs.row_doubts import row_doubts
 from rift_cl.commands.inputs.scan_axis import (
     SettledAxis,
@@ -210,6 +211,8 @@ class SliceInput:
         # What one side of the detector misses is no truncation where the other side has it.
         measured = row if self.settings.iterative else self._both_sides(row)[0]
         wanted = self.settings.pad == "auto" and is_truncated(measured) and not self.offset
+        # Air that is off zero is no object that goes on.
+        wanted = wanted and beam_level(read.projections[:, 0]) is None
         self.beyond = self.offset and is_truncated(row, self.geometry.center)
         if wanted or self.settings.pad == "on":
             self.pad = max(1, self.scan.shape[2] // _PAD_SHARE)
@@ -222,7 +225,9 @@ class SliceInput:
         """What the data have against the angles, and against an axis that was given."""
         given = self.settings.center
         if self.fan is not None:
-            return [] if given is None else doubted_circle(self.file, given, self.device)
+            if given is None:
+                return []
+            return doubted_circle(self.file, given, self.device, zingers=self.settings.zingers)
         block = row_binning(self.file, self.settings.binning)
         middle = binned_center((self.file.shape[1] - 1) / 2, block)
         return doubted_parallel(
@@ -233,6 +238,7 @@ class SliceInput:
             away=block * (sum(self.rows) // 2 - middle),
             spanned=self.spanned,
             device=self.device,
+            zingers=self.settings.zingers,
         )
 
     @property
@@ -258,12 +264,13 @@ class SliceInput:
 
     def _find_axis(self) -> None:
         """Find the axis, of a fan the sense of rotation too."""
-        geometry = self.file.geometry
+        geometry, zingers = self.file.geometry, self.settings.zingers
         if isinstance(geometry, Fan):
-            self.settled_by = settled_axis(self.file, geometry.center, self.device)
+            center = geometry.center
+            self.settled_by = settled_axis(self.file, center, self.device, zingers=zingers)
             self.center, self.turned = self.settled_by.center, self.settled_by.turned
             return
-        self.estimate = find_axis(self.file, self.device)
+        self.estimate = find_axis(self.file, self.device, zingers=zingers)
         self.center = self.estimate.center
         if self.settings.tilt is None:
             self.tilt = tilt_worth_turning(self.estimate, self.file.shape[1])
@@ -467,9 +474,10 @@ def _pitch_note(source: SliceInput) -> list[str]:
         return ["No distance between detector bins is known (--pitch): lengths are in bins."]
     if given is None or own is None or math.isclose(given, own, rel_tol=1e-6):
         return []
-    alike = "" if source.file.aspect == 1 else "; the distance between rows changes alike"
+    alike = source.file.aspect != 1 and source.settings.row_pitch is None
     return [
-        f"--pitch {given:g} {unit} takes the place of {own:.4g} {unit}, which the file says{alike}."
+        f"--pitch {given:g} {unit} takes the place of {own:.4g} {unit}, which the file says"
+        f"{'; the distance between rows changes alike' if alike else ''}."
     ]
 
 
@@ -529,14 +537,18 @@ def _offset_note(source: SliceInput) -> str:
 
 def _wide_note(source: SliceInput) -> str:
     wide = "The object is wider than the detector (--pad)"
+    inside = (
+        "Inside it, what lies beyond leaves the level of values uncertain by a smooth error, often "
+        "of 10 % and more (the interior problem)."
+    )
     if source.settings.iterative:
         return (
             f"{wide}: slices were computed with a margin of {source.pad} bins on each side, whose "
-            "values are an extrapolation."
+            f"values are an extrapolation, as are all outside the field of view. {inside}"
         )
     return (
         f"{wide}: projections were extrapolated smoothly beyond its ends; values outside the "
-        "field of view are not measured."
+        f"field of view are not measured. {inside}"
     )
 
 

@@ -50,8 +50,6 @@ _BELOW = 0.25
 _OPAQUE, _NEGATIVE = 20.0, 3.0
 # Arrays that are named in a sentence at most.
 _MOST_UNUSED = 4
-# Ends of line integrals that are worth a word, as a share of their range.
-_OFF = 0.02
 # Bins differ from their neighbours by at most this share where the beam is taken from the ends.
 _UNEVEN = 0.05
 _KINDS = "--kind counts, transmission or attenuation"
@@ -268,21 +266,7 @@ def _doubts(found: Finding, kind: Kind, seen: Sample, *, calibrated: bool) -> tu
         return _unused(found) if found.unused and not calibrated else ()
     if found.kind is not None:
         return ()
-    return _off_air(kind, seen) + (_impossible(seen) if kind == "attenuation" else ())
-
-
-def _off_air(kind: Kind, seen: Sample) -> tuple[str, ...]:
-    """A doubt, where both ends of the detector are off what air reads by about as much."""
-    air = 0.0 if kind == "attenuation" else 1.0
-    left, right = (end - air for end in seen.ends)
-    off = abs(left + right) / 2
-    if off <= _OFF * max(seen.high - seen.low, seen.high) or abs(left - right) > off / 2:
-        return ()
-    read = air + (left + right) / 2
-    return (
-        f"Both ends of the detector read {read:.3g}, and air {air:g}: if they see nothing but air, "
-        "bring their line integrals to zero with --background, so many bins at each end.",
-    )
+    return _impossible(seen) if kind == "attenuation" else ()
 
 
 def _impossible(seen: Sample) -> tuple[str, ...]:

@@ -84,10 +84,11 @@ def open_tiff_scan(path: Path, request: ScanRequest, *, budget: int | None) -> S
     else:
         _check_complete(place, stack, request)
     stack = replace(stack, axes=_axes(place, stack, angles, request))
-    flats, flats_from = _calibration(place, "flats", request.flats, stack)
-    darks, darks_from = _calibration(place, "darks", request.darks, stack)
+    flats, flats_from, of_flats = _calibration(place, "flats", request.flats, stack)
+    darks, darks_from, of_darks = _calibration(place, "darks", request.darks, stack)
     if angles is None:
         angles, notes = _assumed(place, stack)
+    notes = (*of_flats, *of_darks, *notes)
     frames = stack.stack
     try:
         radians, phrase, doubts = angles.settled(path, frames.frames, request.angle_unit)
@@ -231,39 +232,48 @@ def _file(path: Path) -> _Place:
 
 def _calibration(
     place: _Place, kind: FrameKind, named: str | None, projections: TiffStack
-) -> tuple[TiffStack | None, str]:
-    """The flats or the darks, and a phrase that says where they come from."""
+) -> tuple[TiffStack | None, str, tuple[str, ...]]:
+    """The flats or the darks, a phrase that says where they come from, and what is to be noted."""
     if kind == "flats" and named in (AIR, MEAN):
-        return None, ""
-    files, where = _calibration_files(place, kind, named)
+        return None, "", ()
+    files, where, outside = _calibration_files(place, kind, named)
     if not files:
-        return None, ""
+        return None, "", ()
     wanted, read = projections.stack, tiff_stack(files)
+    notes = (f"The {kind} are those of {where}, outside the scan's folder.",) if outside else ()
     # Beside sinograms, flats often stand frame by frame.
     for axes in (projections.axes, "nrb"):
         stack = replace(read, axes=axes)
         if (stack.stack.rows, stack.stack.bins) == (wanted.rows, wanted.bins):
-            return stack, f", {kind} from {where}"
+            return stack, f", {kind} from {where}", notes
     found = replace(read, axes=projections.axes).stack
-    raise ShapeError(
-        f"{files[0]}: the {kind} have {found.rows} x {found.bins} rows and bins, the "
-        f"projections {wanted.rows} x {wanted.bins}: they must agree"
+    sizes = (
+        f"the {kind} have {found.rows} x {found.bins} rows and bins, the projections "
+        f"{wanted.rows} x {wanted.bins}"
     )
+    if outside:
+        return None, "", (f"{where}, outside the scan's folder, was passed over: {sizes}.",)
+    raise ShapeError(f"{files[0]}: {sizes}: they must agree")
 
 
 def _calibration_files(
     place: _Place, kind: FrameKind, named: str | None
-) -> tuple[tuple[Path, ...], str]:
+) -> tuple[tuple[Path, ...], str, bool]:
+    """Files of flats or darks, where they lie, and whether nobody named that and it is outside."""
     if named is not None:
         found = _named(place, named)
-        return _frames_in(found), str(found)
+        return _frames_in(found), str(found), False
     if kind in place.beside:
-        return place.beside[kind], "the same folder"
+        return place.beside[kind], "the same folder", False
     for folder in place.folders:
+        outside = place.path.is_dir() and not folder.is_relative_to(place.path)
+        if outside and place.beam is not None and place.beam.white is not None:
+            # The scanner divided by its own flats, and tells the beam that is left.
+            continue
         entry = folder_of(kind, folder)
         if entry is not None:
-            return _frames_in(entry), str(entry)
-    return (), ""
+            return _frames_in(entry), str(entry), outside
+    return (), "", False
 
 
 def _frames_in(path: Path) -> tuple[Path, ...]:

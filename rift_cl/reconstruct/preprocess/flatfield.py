@@ -2,7 +2,7 @@
 
 By Beer and Lambert a ray that arrives with I of its I0 quanta has the line integral
 ``-log(I / I0)`` of attenuation. Counts are corrected by the means of the dark frames (no beam)
-and of the flat frames (beam, no sample), in which outliers among five frames or more do not count;
+and of the flat frames (beam, no sample), in which outliers among three frames or more do not count;
 flats that were taken at several times are interpolated between them, because beams drift. Two kinds
 of samples tell nothing:
 
@@ -31,9 +31,10 @@ Counts = NDArray[np.int64]
 _DEAD = 0.05
 # Fewer quanta than this share of the beam are not told from none, whatever the darks' noise.
 _FAINTEST = 1e-7
-# Flats or darks from which on an outlier among them can be told: so many standard deviations, of
-# which the median deviation is one over 1.48.
-_ENOUGH_FRAMES, _OUTLIER, _SIGMAS = 5, 8.0, 1.48
+# Flats or darks from which on an outlier among them can be told, and from which on the median
+# deviation of a pixel tells their spread; how many standard deviations an outlier is away, of which
+# a median deviation is one over 1.48.
+_ENOUGH_FRAMES, _MANY_FRAMES, _OUTLIER, _SIGMAS = 3, 5, 8.0, 1.48
 # Views and angle from which on a pixel that reads the same in all of them is told, and by how much
 # it may vary, as a share of what its row spans.
 _ENOUGH_VIEWS, _ENOUGH_TURN, _STUCK = 12, np.radians(150), 1e-6
@@ -200,7 +201,9 @@ def _mean(frames: Floats) -> Floats:
         away = np.abs(frames - middle)
         # Of the pixel and of its row, the wider spread: that of few frames may be none by chance.
         usual = _SIGMAS * np.median(away, axis=0)
-        usual = np.maximum(usual, np.median(usual, axis=1, keepdims=True))
+        # Half of three or four frames tell too little; most pixels of the row have no hit at all.
+        of_row = usual if len(frames) >= _MANY_FRAMES else frames.std(axis=0, ddof=1)
+        usual = np.maximum(usual, np.median(of_row, axis=1, keepdims=True))
         hit = (away > _OUTLIER * usual) & (usual > 0)
         if hit.any():
             frames = np.where(hit, middle, frames)

@@ -60,9 +60,18 @@ def offset(levels: ArrayLike, ratio: float) -> Mask:
 
 
 def unevenness(levels: ArrayLike) -> Profile:
-    """By how much the level of each bin exceeds the median of those around it, (bin,)."""
+    """By how much the level of each bin exceeds the median of those around it, (bin,).
+
+    Near an end the window holds as many bins on either side as there are before the end: mirrored,
+    it would hold one side of a slope alone, and lift the air beside a steep object by its height.
+    """
     level = np.asarray(levels, np.float64)
-    return level - _median(level, odd_window(_LEVEL_WINDOW, level.size))
+    window = odd_window(_LEVEL_WINDOW, level.size)
+    usual = _median(level, window)
+    for reach in range(min(window // 2, level.size)):
+        usual[reach] = np.median(level[: 2 * reach + 1])
+        usual[-1 - reach] = np.median(level[-1 - 2 * reach :])
+    return level - usual
 
 
 def odd_window(window: int, bins: int) -> int:
