@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import time
-from collections.abc import Generator, Iterator, Mapping
+from collections.abc import Generator, Iterator
 
 from rift_cl.commands.cameras.arc import check_places, place_notes
 from rift_cl.commands.cameras.fit_cameras import CAMERA_FILES, save_fit_cameras, with_poses
@@ -238,24 +238,14 @@ class Fit(FitRun[FitPhotosSettings]):
         self._begin(trainer)
         self._keep_cameras(capture, trainer)
         yield from self._trained(trainer, pictures)
-        given = {name: self._pictures(views, pictures) for name, views in self._scored().items()}
-        tests = given
         if trainer.poses is not None:
-            tests = yield from self._placed(trainer, given)
             pictures = pictures.placed([trainer.camera(k) for k in range(len(pictures.views))])
+        self._save_scene(trainer)
+        for name, views in self._scored().items():
+            yield from self._score(name, views, trainer, pictures)
+        if trainer.poses is not None:
             self._keep_cameras(capture, trainer)
         splats = trainer.parameters.drawn
-        self._save_scene(trainer)
-        for name, test in tests.items():
-            self.scores[name] = []
-            for score in score_views(
-                *(trainer.renderer, splats, test, pictures),
-                given=None if trainer.poses is None else given[name].cameras,
-                exposed=trainer.exposures is not None,
-            ):
-                self.scores[name].append(score)
-                yield Report(len(self.scores[name]), len(test.views), f"views of {name}")
-                self._heed(trainer.parameters.step)
         self.scores = {name: scores for name, scores in self.scores.items() if scores}
         self.metrics = {
             "splats": len(splats),
@@ -290,21 +280,39 @@ class Fit(FitRun[FitPhotosSettings]):
             self.settled, self.metrics, page, self.device, asked=settings, **self.decided
         )
 
+    def _score(
+        self, name: str, views: tuple[View, ...], trainer: Trainer, training: CapturePictures
+    ) -> Iterator[Report]:
+        """Score a group of pictures, by cameras that are refined against them where the fit's are.
+
+        They are given up with it, since each group may keep a share of the memory that is free.
+        """
+        test, given = self._pictures(views, training), None
+        if trainer.poses is not None:
+            given = test.cameras
+            test = test.placed((yield from self._placed(name, trainer, test)))
+            if name == _HELD_OUT:
+                self.test_views = with_poses(self.test_views, test.cameras)
+        self.scores[name] = []
+        for score in score_views(
+            *(trainer.renderer, trainer.parameters.drawn, test, training),
+            given=given,
+            exposed=trainer.exposures is not None,
+        ):
+            self.scores[name].append(score)
+            yield Report(len(self.scores[name]), len(views), f"views of {name}")
+            self._heed(trainer.parameters.step)
+
     def _placed(
-        self, trainer: Trainer, given: Mapping[str, CapturePictures]
-    ) -> Generator[Report, None, dict[str, CapturePictures]]:
-        """The pictures that are scored, by cameras that are refined against them."""
-        placed = {}
-        for name, test in given.items():
-            cameras = list[Camera]()
-            for camera in placed_cameras(trainer, test):
-                cameras.append(camera)
-                yield Report(len(cameras), len(test.views), f"poses of {name}")
-                self._heed(trainer.parameters.step)
-            placed[name] = test.placed(cameras)
-        if self.test_views:
-            self.test_views = with_poses(self.test_views, placed[_HELD_OUT].cameras)
-        return placed
+        self, name: str, trainer: Trainer, test: CapturePictures
+    ) -> Generator[Report, None, list[Camera]]:
+        """The cameras of pictures that are scored, each refined against its picture."""
+        cameras = list[Camera]()
+        for camera in placed_cameras(trainer, test):
+            cameras.append(camera)
+            yield Report(len(cameras), len(test.views), f"poses of {name}")
+            self._heed(trainer.parameters.step)
+        return cameras
 
     def _save_scene(self, trainer: Trainer) -> None:
         """Leave the splats, and the light that they share, in the folder."""

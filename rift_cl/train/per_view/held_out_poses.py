@@ -55,6 +55,8 @@ def _placed(trainer: Trainer, pictures: TrainingViews, poses: Poses, number: int
         loss, by_image = _compared(trainer, frame.image, target, weights)
         if loss < least:
             best, least = camera, loss
+        if step == _STEPS:
+            break
         gradients = trainer.renderer.backward(
             frame, by_image, with_camera=True, with_background=False, retain=False
         )

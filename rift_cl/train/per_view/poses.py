@@ -51,7 +51,9 @@ class Poses:
         """
         twist = twist_gradient(self.views[number], by_view)
         rates = np.repeat([rate, rate * self.extent], 3)
-        step = -self._adam.step(number, twist, rates)
+        # Adam's steps are longer where a gradient is much larger than those before; the reach that
+        # a run gives a camera counts on none that is.
+        step = -np.clip(self._adam.step(number, twist, rates), -rates, rates)
         if not step.any():
             return
         turn, view = Rotation.from_rotvec(step[:3]).as_matrix(), self.views[number]
