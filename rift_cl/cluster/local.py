@@ -9,7 +9,7 @@ from typing import Any
 
 from rift_cl.cl.device import Device
 from rift_cl.cl.discovery import alike_devices
-from rift_cl.cluster.fork_server import METHOD, begin_server
+from rift_cl.cluster.fork_server import begin_server, worker_environment
 
 LOOPBACK = "127.0.0.1"
 # What tells PoCL how many threads to take: until version 3, and since version 4.
@@ -43,7 +43,7 @@ def worker_environments(device: Device, selector: str | None, workers: int) -> l
 @contextmanager
 def local_cluster(environments: list[dict[str, str]]) -> Iterator[Any]:
     """A scheduler and a worker for each environment, which this machine alone can reach."""
-    begin_server()
+    method = begin_server()
     import dask
     from distributed import Nanny, Scheduler, SpecCluster
 
@@ -51,7 +51,7 @@ def local_cluster(environments: list[dict[str, str]]) -> Iterator[Any]:
         # Dask looks at every thread a hundred times a second: a processor's time, and memory that
         # grows with the run.
         "distributed.worker.profile.enabled": False,
-        "distributed.worker.multiprocessing-method": METHOD,
+        "distributed.worker.multiprocessing-method": method,
     }
     scheduler = {
         "cls": Scheduler,
@@ -66,7 +66,7 @@ def local_cluster(environments: list[dict[str, str]]) -> Iterator[Any]:
                 # Work is cut to the budget; what Dask counts is the driver's memory as well.
                 "memory_limit": 0,
                 "dashboard": False,
-                "env": environment,
+                "env": worker_environment(environment),
                 "preload": ["rift_cl.cluster.on_worker"],
                 "silence_logs": "CRITICAL",
             },

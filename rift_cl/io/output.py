@@ -155,6 +155,11 @@ def staged_folder(path: Path, strange: Callable[[list[str]], str | None]) -> Ite
         raise
 
 
+def leftovers(name: str) -> tuple[str, str]:
+    """What writing a file or folder of this name leaves beside it where the process is killed."""
+    return name + PART, name + _OLD
+
+
 def check_space(path: Path, need: int) -> None:
     """Refuse to begin what the disk cannot hold.
 

@@ -139,8 +139,11 @@ def test_a_run_goes_on_with_a_slab_that_a_worker_made(scan, tmp_path, monkeypatc
     monkeypatch.setattr(job.kept, "save", once)
     with pytest.raises(StoppedError, match="24 of 40 slices are kept"):
         made(job)
+    # What a run in another format leaves that is killed.
+    (out / "volume.zarr.part").mkdir()
     for _ in (again := reconstruction_of(replace(given, resume=True))).run():
         pass
+    assert not (out / "volume.zarr.part").exists()
     alone = reconstruction_of(replace(given, out=tmp_path / "b"))
     for _ in alone.run():
         pass

@@ -79,6 +79,18 @@ def test_a_failure_of_a_run_that_went_on_loses_nothing(scan, tmp_path, monkeypat
     assert contents(tmp_path / "out") == before
 
 
+def test_what_a_killed_run_left_of_another_format_goes(scan, tmp_path, monkeypatch):
+    out = tmp_path / "out"
+    arguments = ("reconstruct", scan.counts, "--center", 45, "--out", out)
+    cut_off(monkeypatch, (*arguments, "--format", "h5"))
+    # As after SIGKILL, when nothing is removed any more.
+    (out / "volume.h5.part").write_bytes(b"half a volume")
+    (out / "volume.zarr.part").mkdir()
+    (out / "volume.zarr.old").mkdir()
+    assert run(*arguments, "--resume", "--format", "tiff") == 0
+    assert (out / "slices").is_dir() and not list(out.glob("volume.*"))
+
+
 def test_a_run_that_goes_on_begins_to_count_where_it_stands(scan, tmp_path, monkeypatch):
     """So that its pace is its own: the first report is what the rate is counted from."""
     out = tmp_path / "out"

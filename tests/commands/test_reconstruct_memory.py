@@ -49,3 +49,18 @@ def test_slices_four_times_the_memory_have_the_same_bits(scan, tmp_path, method)
     whole = rift.reconstruct_scan(scan, tmp_path / "a", **common)
     parts = rift.reconstruct_scan(scan, tmp_path / "b", memory=str(memory), **common)
     assert parts.read().tobytes() == whole.read().tobytes()
+
+
+@pytest.mark.parametrize(
+    ("rows", "fitting", "wanted"), [(390, 16, 16), (24, 20, 16), (390, 12, 8), (12, 12, 12)]
+)
+def test_a_slab_is_as_many_slices_as_fit_of_a_part_of_the_volume(
+    scan, tmp_path, rows, fitting, wanted
+):
+    common = {"dataset": "data", "theta": "angles", "angle_unit": "radians", "kind": "attenuation"}
+    common |= {"center": 63.5, "out": tmp_path / "none", "footprint": "strip", "rows": (0, rows)}
+    planned = Reconstruction(ReconstructSettings(scan, **common)).inversion
+    memory = planned.fixed() + planned.need * fitting
+    job = Reconstruction(ReconstructSettings(scan, memory=str(memory), **common))
+    starts = [slab.start for slab in job.slabs]
+    assert starts == list(range(0, rows, wanted)) and job.slabs[-1].stop == rows

@@ -28,7 +28,7 @@ from rift_cl.commands.fit_xray.scores import (
 from rift_cl.commands.fit_xray.settings import FitXraySettings
 from rift_cl.commands.pictures.evenly_spaced import evenly
 from rift_cl.io.scenes.splat_scene import XrayScene
-from rift_cl.io.volumes import VOLUME_NAMES, open_volume
+from rift_cl.io.volumes import VOLUME_NAMES, open_volume, other_volumes
 from rift_cl.progress import Report
 from rift_cl.splat.splats import Splats
 from rift_cl.splat.voxels import voxelise
@@ -214,7 +214,7 @@ class XrayFit(FitRun[FitXraySettings]):
             origin=source.first_sample(whole.grid),
         ) as writer:
             writer.write(0, slices)
-        self.folder.drop(*(set(VOLUME_NAMES.values()) - {path.name}))
+        self.folder.drop(*other_volumes(settings.format))
         shown = (slices, density * volume)
         notes = [*source.notes, *history_notes(self.metrics["history"])]
         name = source.scan.path.name

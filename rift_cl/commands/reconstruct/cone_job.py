@@ -54,7 +54,7 @@ from rift_cl.errors import InputError
 from rift_cl.geometry import Cone
 from rift_cl.io.output import atomic_path
 from rift_cl.io.scans.scan_file import ScanFile
-from rift_cl.io.volumes import VOLUME_NAMES, VolumeWriter, open_volume
+from rift_cl.io.volumes import VolumeWriter, open_volume, other_volumes
 from rift_cl.operators import Projector
 from rift_cl.progress import Report
 from rift_cl.reconstruct import FDK, Attenuation, Katsevich, poisson_weights
@@ -496,7 +496,7 @@ class ConeReconstruction:
             clipped = clipped_words((below, above), self._values, reached, unit)
             self._say(*[clipped] if clipped else [])
         self.folder.mark()
-        self.folder.drop(*set(VOLUME_NAMES.values()) - {volume_path(self.settings).name})
+        self.folder.drop(*other_volumes(self.settings.format))
         self._show(self._sections.planes)
         if self.settings.zingers is not None:
             self.metrics["zingers"] = self.source.clean.zingers

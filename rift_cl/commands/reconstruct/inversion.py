@@ -151,11 +151,13 @@ class Inversion:
             ResourceLimitError: not even one slice does.
         """
         A = self.projector(1)
-        most = _ITERATIVE_SLAB if self.settings.iterative else _SLAB
         cut = []
         for run in runs:
-            fitting = [part.stop - part.start for part in self._fitting(run.stop - run.start, A)]
-            cut += cut_evenly(run, most if len(fitting) == 1 else min(most, *fitting))
+            most = _ITERATIVE_SLAB if self.settings.iterative else _SLAB
+            # Halves, quarters, ... of a part, which end where the part does.
+            while len(self._fitting(min(most, run.stop - run.start), A)) > 1:
+                most //= 2
+            cut += cut_evenly(run, most)
         return cut
 
     def _fitting(self, count: int, A: AnyProjector) -> list[slice]:

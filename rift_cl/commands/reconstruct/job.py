@@ -47,10 +47,9 @@ from rift_cl.commands.reconstruct.volume import (
     clipped_words,
     made_words,
     open_slices,
-    volume_path,
 )
 from rift_cl.io.scans.scan_file import ScanFile
-from rift_cl.io.volumes import VOLUME_NAMES, VolumeWriter
+from rift_cl.io.volumes import VolumeWriter, other_volumes
 from rift_cl.progress import Report
 from rift_cl.reconstruct import Attenuation
 
@@ -393,7 +392,7 @@ class Reconstruction:
             self._say(*[clipped] if clipped else [])
         # From here on the slices are this run's, and an earlier configuration no longer theirs.
         self.folder.mark()
-        self.folder.drop(*set(VOLUME_NAMES.values()) - {volume_path(self.settings).name})
+        self.folder.drop(*other_volumes(self.settings.format))
         if not self._shown:
             assert self._preview.middle is not None
             self._show(self._preview.middle)

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from rift_cl.commands.reconstruct.settings import ReconstructSettings
 from rift_cl.commands.reconstruct.slice_input import SliceInput
 from rift_cl.commands.reconstruct.slice_window import Window
+from rift_cl.io.output import leftovers
 from rift_cl.io.volumes import (
     VOLUME_NAMES,
     VolumeWriter,
@@ -119,7 +120,8 @@ def check_place(settings: ReconstructSettings, source: SliceInput, window: Windo
         OutputError: a place holds something else, or cannot be written to.
     """
     for format, name in VOLUME_NAMES.items():
-        if format == settings.format or (settings.out / name).exists():
+        earlier = any((settings.out / left).exists() for left in (name, *leftovers(name)))
+        if format == settings.format or earlier:
             there = dataclasses.replace(settings, format=format, dtype="float32", window=None)
             with suppress(_PlaceFoundError), open_slices(there, source, window, None):
                 raise _PlaceFoundError

@@ -9,6 +9,7 @@ from rift_cl.io.volumes.volume import (
     VOLUME_NAMES,
     VolumeWriter,
     open_volume,
+    other_volumes,
     read_volume,
     read_volume_place,
 )
@@ -18,6 +19,7 @@ __all__ = [
     "SampleWindow",
     "VolumeWriter",
     "open_volume",
+    "other_volumes",
     "read_volume",
     "read_volume_place",
     "suggested_window",

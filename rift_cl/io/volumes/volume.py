@@ -30,7 +30,7 @@ from rift_cl.errors import (
 from rift_cl.geometry import Grid
 from rift_cl.geometry.numbers import real_numbers
 from rift_cl.io.boundary import reading
-from rift_cl.io.output import check_space
+from rift_cl.io.output import check_space, leftovers
 from rift_cl.io.volumes.layout import Floats, VolumeLayout, VolumePlace, WriteSlab
 from rift_cl.io.volumes.sample_window import SampleWindow
 
@@ -58,6 +58,12 @@ _SLICE_ROOM = 1 << 12
 # Formats that keep coarser copies as well: a quarter, a sixteenth, ... at most.
 _COPIES = {"zarr": 4 / 3}
 _MRC_MARK = (208, b"MAP")
+
+
+def other_volumes(format: Format) -> list[str]:
+    """Names of volumes in other formats, and of what writing one leaves where it is killed."""
+    names = [name for other, name in VOLUME_NAMES.items() if other != format]
+    return [*names, *(left for name in names for left in leftovers(name))]
 
 
 class _Format(Protocol):
