@@ -69,6 +69,16 @@ def test_a_beam_that_is_weaker_throughout_has_one_level(weaker):
     assert found.levels.mean() == pytest.approx(-np.log(1 - weaker), abs=2e-3)
 
 
+def test_noise_of_the_flats_hides_no_weak_beam_on_a_small_detector():
+    lines = counted(WHOLE[:, np.linspace(0, BINS - 1, 40).round().astype(int)], beam=0.95)
+    found = []
+    for seed in range(40):
+        # Of 0.4 % in each bin, in all views alike.
+        flats = np.random.default_rng(seed).normal(0, 0.004, 40)
+        found.append(beam_level((lines + flats).astype(np.float32)))
+    assert sum(one is not None for one in found) >= 35
+
+
 @pytest.mark.parametrize(("fall", "words"), [(0.3, "fell by 30 %"), (-0.2, "rose by 20 %")])
 def test_a_beam_that_falls_is_told_by_how_much(fall, words):
     found = beam_level(counted(WHOLE, beam=np.exp(np.log(1 - fall) * np.linspace(0, 1, VIEWS))))

@@ -15,8 +15,9 @@ from numpy.typing import NDArray
 
 Floats = NDArray[np.float32]
 Levels = NDArray[np.float64]
-# Bins at each end, as a share of the detector.
-_END = 1 / 20
+# Bins at each end, as a share of the detector, and at least: by fewer than three, noise of flats
+# cannot be told from an object that falls along the bins.
+_END, _FEWEST = 1 / 20, 3
 # Least level that is worth a doubt, and the highest that is a beam's, as shares of this percentile
 # of the line integrals: of an object that covers the detector, ends are either near that or steep.
 _OFF, _MOST, _STRONG = 0.01, 0.5, 99.5
@@ -84,7 +85,7 @@ def beam_level(lines: Floats) -> BeamLevel | None:
         None where the ends read zero, or where they are not air for sure.
     """
     most = float(np.percentile(lines, _STRONG))
-    count = max(2, round(_END * lines.shape[1]))
+    count = max(_FEWEST, round(_END * lines.shape[1]))
     if most <= 0 or lines.shape[1] < 4 * count:
         return None
     # Both from the outermost bin inwards.
@@ -148,11 +149,13 @@ def _level(found: BeamLevel, ends: Levels) -> float:
 def _bin_error(ends: Levels) -> float:
     """Standard error of the ends' mean by what differs from bin to bin in all views, as flats do.
 
+    A slope that both ends share inwards is an object's, and is left out.
+
     Args:
-        ends: line integrals, (2, angle, bin).
+        ends: line integrals, (2, angle, bin), from the outermost bin inwards.
     """
     rough = np.diff(ends.mean(axis=1), axis=1)
-    return float(np.sqrt(rough.var(axis=1).mean() / 2 / (2 * ends.shape[2])))
+    return float(np.sqrt(rough.var(ddof=1) / 2 / (2 * ends.shape[2])))
 
 
 def _change(apart: Levels, noise: float) -> float:
