@@ -173,6 +173,31 @@ def test_a_background_is_advised_where_ends_of_line_integrals_are_air(lines, tmp
     assert ("wider than the detector" in told) == (way == "cut")
 
 
+def test_air_of_line_integrals_changes_by_their_own_unit(lines, tmp_path, capsys):
+    noisy = lines + 0.105 * FALL + np.random.default_rng(0).normal(0, 0.001, lines.shape)
+    path = tmp_path / "scan.npz"
+    np.savez(path, projections=(100 * noisy).astype(np.float32), angles=ANGLES)
+    words = ["reconstruct", str(path), "--out", str(tmp_path / "out"), "--kind", "attenuation"]
+    assert main([*words, "--center", str((BINS - 1) / 2)]) == 0
+    told = capsys.readouterr().err
+    assert re.search("Doubt: air changes by 10.[4-6] from the first view to the last", told)
+    assert "the beam" not in told
+
+
+def test_flats_of_two_levels_at_one_time_are_said_to_be_of_one(lines, tmp_path, capsys):
+    made = _two_flats(lines)
+    with h5py.File(tmp_path / "scan.nxs", "w") as file:
+        entry = file.create_group("entry1/tomo_entry")
+        stacks = [made[name] for name in ("data_dark", "data_white", "data")]
+        entry["instrument/detector/data"] = np.concatenate(stacks).astype(np.uint16)
+        entry["instrument/detector/image_key"] = np.repeat([2, 1, 0], (8, 8, VIEWS))
+        entry["sample/rotation_angle"] = np.r_[np.zeros(16), np.rad2deg(ANGLES)]
+    words = ["reconstruct", str(tmp_path / "scan.nxs"), "--out", str(tmp_path / "out")]
+    assert main([*words, "--center", str((BINS - 1) / 2)]) == 0
+    told = capsys.readouterr().err
+    assert "the flats read two levels" in told and "at one time" in told
+
+
 def test_an_axis_that_is_not_found_for_that_is_told_with_it(lines, tmp_path, capsys):
     made = _sample_in_flats(lines)
     with h5py.File(tmp_path / "scan.h5", "w") as file:

@@ -216,6 +216,30 @@ def test_frames_of_another_size_outside_the_folder_are_passed_over(tmp_path: Pat
         open_scan(tmp_path / "scan")
 
 
+def _two_sizes(folder: Path) -> None:
+    made.write_series(folder, "f{}.tif", [calibration("flats")[0], calibration("flats")[1, :-1]])
+
+
+def _coloured(folder: Path) -> None:
+    made.write_series(folder, "f{}.tif", np.zeros((2, 8, 9, 3), "u1"), photometric="rgb")
+
+
+def _damaged(folder: Path) -> None:
+    made.write_series(folder, "f{}.tif", calibration("flats"))
+    (folder / "f1.tif").write_bytes(b"II*\0")
+
+
+@pytest.mark.parametrize("write", [_two_sizes, _coloured, _damaged])
+def test_frames_outside_the_folder_that_are_no_stack_are_passed_over(tmp_path: Path, write) -> None:
+    made.write_series(tmp_path / "scan", "p{}.tif", made.frames())
+    write(tmp_path / "flats")
+    scan = as_they_are(tmp_path / "scan")
+    (note,) = [note for note in scan.notes if "passed over" in note]
+    assert note.startswith(str(tmp_path / "flats")) and scan.read(0, 1).flats is None
+    with pytest.raises(InputError, match="flats"):
+        as_they_are(tmp_path / "scan", flats=str(tmp_path / "flats"))
+
+
 @pytest.mark.parametrize(
     ("names", "times"),
     [

@@ -6,7 +6,7 @@ import pytest
 import rift_cl as rift
 from rift_cl.errors import InputError, NonFiniteError, ShapeError
 from rift_cl.reconstruct.preprocess import STRIPE_METHODS, remove_rings
-from rift_cl.reconstruct.preprocess.stripe_detection import fluctuating, offset
+from rift_cl.reconstruct.preprocess.stripe_detection import fluctuating, offset, unevenness
 from rift_cl.reference import detector_columns as twin
 
 pytestmark = pytest.mark.dealt
@@ -186,6 +186,24 @@ def test_large_leaves_air_beside_a_steep_object_at_zero():
     np.testing.assert_allclose(mended[:, ends], 0, atol=1e-3 * disc.max())
     # The rim next to it as well, less the curvature of its profile.
     np.testing.assert_allclose(mended[:, :25], disc[:, :25], atol=0.03 * disc.max())
+
+
+@pytest.mark.parametrize("start", [1, 3, 12])
+@pytest.mark.parametrize("mirrored", [False, True])
+def test_levels_are_brought_together_up_to_the_ends(start, mirrored):
+    slope = np.linspace(0, 3, BINS)
+    stripe = np.zeros(BINS)
+    stripe[start : start + 5] = 1
+    stripe = stripe[::-1] if mirrored else stripe
+    # A stripe moves the rank of the median by its bins.
+    np.testing.assert_allclose(unevenness(slope + stripe), stripe, atol=5.01 * slope[1])
+    np.testing.assert_allclose(unevenness(slope), 0, atol=1e-12)
+
+
+def test_a_stripe_of_the_outermost_bins_is_left_whole():
+    stripe = np.zeros(BINS)
+    stripe[:5] = 1
+    np.testing.assert_array_equal(unevenness(stripe), 0)
 
 
 def test_large_brings_levels_together_unless_told_not_to(noisy):

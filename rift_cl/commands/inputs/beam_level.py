@@ -9,14 +9,16 @@ what turns is not the same at both ends, and what it is thick at an end falls al
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 Floats = NDArray[np.float32]
 Levels = NDArray[np.float64]
-# Bins at each end, as a share of the detector.
-_END = 1 / 20
+# Bins at each end, as a share of the detector, and at least: by fewer than three, noise of flats
+# cannot be told from an object that falls along the bins.
+_END, _FEWEST = 1 / 20, 3
 # Least level that is worth a doubt, and the highest that is a beam's, as shares of this percentile
 # of the line integrals: of an object that covers the detector, ends are either near that or steep.
 _OFF, _MOST, _STRONG = 0.01, 0.5, 99.5
@@ -55,23 +57,51 @@ class BeamLevel:
         return bool(np.sqrt(spread) <= _CONSTANT * abs(self.levels.mean()))
 
     @property
-    def change(self) -> str:
-        """How the beam changed from view to view, the end of a sentence that begins with it."""
+    def change(self) -> LevelChange:
+        """How it differs from view to view."""
         levels = self.levels
         view, last = np.arange(len(levels)), len(levels) - 1
-        variance = max(float(levels.var()) - self.noise, 1e-12)
+        variance = max(float(levels.var()) - self.noise, 0.0)
         slope, begin = np.polyfit(view, levels, 1)
         line = float((begin + slope * view).var())
         at, rise = _step(levels)
         jump = rise**2 * at * (last + 1 - at) / (last + 1) ** 2
         if max(line, jump) >= _EXPLAINED * variance:
             if line >= jump:
-                return f"{_moved(slope * last)} from the first view to the last"
-            return f"{_moved(rise)} at view {at}"
+                return LevelChange("moved", float(slope * last), "from the first view to the last")
+            return LevelChange("moved", rise, f"at view {at}")
         slow = _blurred(levels)
         if float(slow.var()) >= _SLOW * variance:
-            return f"changed by {_percent(float(np.ptp(slow)))} % in the course of the views"
-        return f"flickered by {_percent(float(np.sqrt(variance)))} % from view to view"
+            return LevelChange("changed", float(np.ptp(slow)), "in the course of the views")
+        return LevelChange("flickered", float(np.sqrt(variance)), "from view to view")
+
+
+@dataclass(frozen=True)
+class LevelChange:
+    """By how much the line integrals of air differ between views, and where.
+
+    Args:
+        kind: "moved" along a line or in a step, "changed" slowly or "flickered".
+        rise: in the unit of the line integrals; below zero where they fell, of a move alone.
+        where: among the views, the end of a sentence.
+    """
+
+    kind: Literal["moved", "changed", "flickered"]
+    rise: float
+    where: str
+
+    @property
+    def of_beam(self) -> str:
+        """What the beam did, where line integrals are logarithms of it."""
+        moved = "fell" if self.rise > 0 else "rose"
+        verb = moved if self.kind == "moved" else self.kind
+        return f"{verb} by {abs(100 * (1 - np.exp(-self.rise))):.2g} % {self.where}"
+
+    @property
+    def of_values(self) -> str:
+        """What air does in line integrals, in their own unit."""
+        verb = "flickers" if self.kind == "flickered" else "changes"
+        return f"{verb} by {abs(self.rise):.3g} {self.where}"
 
 
 def beam_level(lines: Floats) -> BeamLevel | None:
@@ -84,7 +114,7 @@ def beam_level(lines: Floats) -> BeamLevel | None:
         None where the ends read zero, or where they are not air for sure.
     """
     most = float(np.percentile(lines, _STRONG))
-    count = max(2, round(_END * lines.shape[1]))
+    count = max(_FEWEST, round(_END * lines.shape[1]))
     if most <= 0 or lines.shape[1] < 4 * count:
         return None
     # Both from the outermost bin inwards.
@@ -148,11 +178,13 @@ def _level(found: BeamLevel, ends: Levels) -> float:
 def _bin_error(ends: Levels) -> float:
     """Standard error of the ends' mean by what differs from bin to bin in all views, as flats do.
 
+    A slope that both ends share inwards is an object's, and is left out.
+
     Args:
-        ends: line integrals, (2, angle, bin).
+        ends: line integrals, (2, angle, bin), from the outermost bin inwards.
     """
     rough = np.diff(ends.mean(axis=1), axis=1)
-    return float(np.sqrt(rough.var(axis=1).mean() / 2 / (2 * ends.shape[2])))
+    return float(np.sqrt(rough.var(ddof=1) / 2 / (2 * ends.shape[2])))
 
 
 def _change(apart: Levels, noise: float) -> float:
@@ -187,12 +219,3 @@ def _step(levels: Levels) -> tuple[int, float]:
     low, high = sums[:-1] / after, (sums[-1] - sums[:-1]) / (len(levels) - after)
     best = int(np.argmax(after * (len(levels) - after) * (high - low) ** 2))
     return int(after[best]), float(high[best] - low[best])
-
-
-def _moved(rise: float) -> str:
-    """What a beam did of which the line integrals in air rise by so much."""
-    return f"{'fell' if rise > 0 else 'rose'} by {abs(100 * (1 - np.exp(-rise))):.2g} %"
-
-
-def _percent(difference: float) -> str:
-    return f"{100 * (1 - np.exp(-difference)):.2g}"

@@ -128,7 +128,7 @@ def _frames(rows: ScanRows) -> list[str]:
 
 
 def _two_levels(scan: ScanFile, rows: ScanRows) -> list[str]:
-    """Flats of two times that nothing tells apart but the beam, which changed in between."""
+    """Flats of two levels that no times tell apart, as where the beam changed in between."""
     flats = rows.flats
     if flats is None or (scan.flats_at is not None and len(np.unique(scan.flats_at)) > 1):
         return []
@@ -142,10 +142,13 @@ def _two_levels(scan: ScanFile, rows: ScanRows) -> list[str]:
     within = max(float(np.ptp(low)), float(np.ptp(high)))
     if gaps[widest] <= max(_TWO_LEVELS * high.mean(), _APART * within):
         return []
+    when = "nothing tells when they were taken"
+    if scan.flats_at is not None:
+        when = "all of them were taken at one time"
     return [
         f"Doubt: the flats read two levels, {low.mean():.4g} and {high.mean():.4g} above the "
-        "darks, and nothing tells when they were taken: one mean of them was taken for all views, "
-        "as if the beam had not changed."
+        f"darks, and {when}: one mean of them was taken for all views, as if the beam had not "
+        "changed."
     ]
 
 
@@ -172,10 +175,15 @@ def _weak_beam(scan: ScanFile, lines: Floats) -> list[str]:
         return []
     remedy = f"--background {found.bins} brings it to zero"
     level = float(found.levels.mean())
-    if found.constant and scan.kind == "attenuation":
+    if scan.kind == "attenuation":
+        if found.constant:
+            return [
+                f"Both ends of the detector read {level:.3g} in all views alike, and air 0: if "
+                f"they see nothing but air, {remedy}."
+            ]
         return [
-            f"Both ends of the detector read {level:.3g} in all views alike, and air 0: if they "
-            f"see nothing but air, {remedy}."
+            f"Doubt: air {found.change.of_values}, as both ends of the detector show, which see "
+            f"it: line integrals are off by as much in each view; {remedy} in every view."
         ]
     if found.constant:
         weaker = "weaker" if level > 0 else "stronger"
@@ -184,8 +192,8 @@ def _weak_beam(scan: ScanFile, lines: Floats) -> list[str]:
             f"beam was {weaker} than in the flats: if they see nothing but air, {remedy}."
         ]
     return [
-        f"Doubt: the beam {found.change}, as both ends of the detector show, which see air: line "
-        f"integrals are off by as much in each view; {remedy} in every view."
+        f"Doubt: the beam {found.change.of_beam}, as both ends of the detector show, which see "
+        f"air: line integrals are off by as much in each view; {remedy} in every view."
     ]
 
 

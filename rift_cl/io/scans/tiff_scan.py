@@ -236,35 +236,29 @@ def _calibration(
     """The flats or the darks, a phrase that says where they come from, and what is to be noted."""
     if kind == "flats" and named in (AIR, MEAN):
         return None, "", ()
-    files, where, outside = _calibration_files(place, kind, named)
-    if not files:
+    found, outside = _calibration_place(place, kind, named)
+    if found is None and kind not in place.beside:
         return None, "", ()
-    wanted, read = projections.stack, tiff_stack(files)
+    where = "the same folder" if found is None else str(found)
+    try:
+        files = place.beside[kind] if found is None else _frames_in(found)
+        stack = _like(projections, tiff_stack(files), kind)
+    except InputError as error:
+        if not outside:
+            raise
+        return None, "", (f"{where}, outside the scan's folder, was passed over: {error}.",)
     notes = (f"The {kind} are those of {where}, outside the scan's folder.",) if outside else ()
-    # Beside sinograms, flats often stand frame by frame.
-    for axes in (projections.axes, "nrb"):
-        stack = replace(read, axes=axes)
-        if (stack.stack.rows, stack.stack.bins) == (wanted.rows, wanted.bins):
-            return stack, f", {kind} from {where}", notes
-    found = replace(read, axes=projections.axes).stack
-    sizes = (
-        f"the {kind} have {found.rows} x {found.bins} rows and bins, the projections "
-        f"{wanted.rows} x {wanted.bins}"
-    )
-    if outside:
-        return None, "", (f"{where}, outside the scan's folder, was passed over: {sizes}.",)
-    raise ShapeError(f"{files[0]}: {sizes}: they must agree")
+    return stack, f", {kind} from {where}", notes
 
 
-def _calibration_files(
+def _calibration_place(
     place: _Place, kind: FrameKind, named: str | None
-) -> tuple[tuple[Path, ...], str, bool]:
-    """Files of flats or darks, where they lie, and whether nobody named that and it is outside."""
+) -> tuple[Path | None, bool]:
+    """Where flats or darks lie, if not beside the projections, and whether outside and unnamed."""
     if named is not None:
-        found = _named(place, named)
-        return _frames_in(found), str(found), False
+        return _named(place, named), False
     if kind in place.beside:
-        return place.beside[kind], "the same folder", False
+        return None, False
     for folder in place.folders:
         outside = place.path.is_dir() and not folder.is_relative_to(place.path)
         if outside and place.beam is not None and place.beam.white is not None:
@@ -272,8 +266,23 @@ def _calibration_files(
             continue
         entry = folder_of(kind, folder)
         if entry is not None:
-            return _frames_in(entry), str(entry), outside
-    return (), "", False
+            return entry, outside
+    return None, False
+
+
+def _like(projections: TiffStack, read: TiffStack, kind: FrameKind) -> TiffStack:
+    """Flats or darks with axes by which they have the projections' rows and bins."""
+    wanted = projections.stack
+    # Beside sinograms, flats often stand frame by frame.
+    for axes in (projections.axes, "nrb"):
+        stack = replace(read, axes=axes)
+        if (stack.stack.rows, stack.stack.bins) == (wanted.rows, wanted.bins):
+            return stack
+    found = replace(read, axes=projections.axes).stack
+    raise ShapeError(
+        f"{read.files[0]}: the {kind} have {found.rows} x {found.bins} rows and bins, the "
+        f"projections {wanted.rows} x {wanted.bins}: they must agree"
+    )
 
 
 def _frames_in(path: Path) -> tuple[Path, ...]:

@@ -62,16 +62,15 @@ def offset(levels: ArrayLike, ratio: float) -> Mask:
 def unevenness(levels: ArrayLike) -> Profile:
     """By how much the level of each bin exceeds the median of those around it, (bin,).
 
-    Near an end the window holds as many bins on either side as there are before the end: mirrored,
-    it would hold one side of a slope alone, and lift the air beside a steep object by its height.
+    Beyond an end the level goes on turned about the outermost bin, so that a slope stays one:
+    mirrored, it would lift the air beside a steep object by its height. A stripe that begins at
+    the outermost bin is left whole: nothing tells it from an object.
     """
     level = np.asarray(levels, np.float64)
     window = odd_window(_LEVEL_WINDOW, level.size)
-    usual = _median(level, window)
-    for reach in range(min(window // 2, level.size)):
-        usual[reach] = np.median(level[: 2 * reach + 1])
-        usual[-1 - reach] = np.median(level[-1 - 2 * reach :])
-    return level - usual
+    half = window // 2
+    longer = np.pad(level, half, "reflect", reflect_type="odd")
+    return level - _median(longer, window)[half:-half]
 
 
 def odd_window(window: int, bins: int) -> int:
