@@ -236,7 +236,10 @@ class Fit(FitRun[FitPhotosSettings]):
             "photographs": place_record([*self.training_views, *self.test_views], settings.out)
         }
         self._begin(trainer)
-        self._keep_cameras(capture, trainer)
+        # A fit that goes on has them, those of scored photographs as they were refined last.
+        there = all((settings.out / name).is_file() for name in CAMERA_FILES[:2])
+        if not (trainer.parameters.step and there):
+            self._keep_cameras(capture, trainer)
         yield from self._trained(trainer, pictures)
         if trainer.poses is not None:
             pictures = pictures.placed([trainer.camera(k) for k in range(len(pictures.views))])
