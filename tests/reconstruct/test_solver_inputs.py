@@ -53,6 +53,18 @@ def test_one_view_and_truncated_views_end_well(device, function, precondition, a
     assert np.linalg.norm(A(image) - y) < 0.3 * np.linalg.norm(y)
 
 
+@pytest.mark.parametrize("method", ["pdhg", "fista"])
+def test_total_variation_has_no_scale_but_the_ends_of_the_type(device, method):
+    A, _, _, y = problem(device)
+    usual = tv(A, y, 0.1, 20, method=method)
+    for factor in (1e-13, 1e13):
+        scaled = tv(A, factor * y, factor * 0.1, 20, method=method)
+        np.testing.assert_allclose(scaled / factor, usual, atol=1e-4 * usual.max())
+    for factor in (1e-21, 1e21):
+        with pytest.raises(NonFiniteError, match="scale y"):
+            tv(A, np.float32(factor) * y, factor * 0.1, 20, method=method)
+
+
 @every_function
 def test_rays_that_miss_everything_are_no_trouble(device, function):
     A = Projector(Grid((6, 6), center=(500, 500)), Parallel([0.1, 1.0], 9), device=device)

@@ -91,9 +91,8 @@ class Fista(VariationSolver):
         before, seen = data.image(), data.data()
         copy(data.device, begun["image"], before)
         copy(data.device, begun["residual" if data.weight is None else "weighted"], seen)
-        largest = data.norm_squared() or 1.0
         self._now = _State(
-            **begun, image_before=before, weighted_before=seen, t=1.0, largest=largest
+            **begun, image_before=before, weighted_before=seen, t=1.0, largest=self._largest
         )
         self._spare = data.image()
 

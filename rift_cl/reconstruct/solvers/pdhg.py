@@ -95,7 +95,7 @@ class Pdhg(VariationSolver):
         if sigma is not None and not one_number(sigma) > 0:
             raise InputError(f"sigma is {sigma!r}, wanted a positive number")
         self._bounds = None if bounds is None else checked_bounds(bounds, data)
-        largest = data.norm_squared() or 1.0
+        largest = self._largest
         usual = _SIGMA if data.weight is None else _WEIGHTED_SIGMA
         self._sigma = usual if sigma is None else float(sigma)
         self._tau = 1 / (2 * self._sigma * largest)

@@ -184,7 +184,7 @@ def sirt(
         y: the data, of shape ``A.range``.
         steps: most steps.
         start: image to begin from; zero if not given.
-        nonnegative: whether to keep the image >= 0.
+        nonnegative: whether to keep the image >= 0, the one to begin from too.
         relaxation: length of a step, between 0 and 2.
         precondition: ``ramp`` or ``capped-voronoi``, for a projector, or a self-adjoint positive
             operator on ``A.range``: many times fewer steps, see ``residual_weight``.
@@ -194,7 +194,9 @@ def sirt(
         weights: how much each sample counts, of the shape of y: its relative inverse variance
             (``poisson_weights``), 0 where nothing was measured; y may be anything there. ``noise``
             and the reported residual are then those of a sample of weight 1, and
-            ``|F^(1/2) W^(1/2) (A x - y)|`` is what becomes small.
+            ``|F^(1/2) W^(1/2) (A x - y)|`` is what becomes small. They take the place of R: without
+            them a ray counts by one over its length in the image, so that equal weights give
+            another image than none.
         subsets: correct the image after each of so many subsets of the views (see
             ``ordered_subsets``): with 10, about ten times fewer steps. Not with ``precondition``.
         out: where to put the result.

@@ -62,6 +62,7 @@ def tv(
 
     Raises:
         InputError: an argument does not fit, or holds NaN or infinity.
+        NonFiniteError: squares of y, or of an image that fits it, leave the range of A's type.
     """
     if method not in METHODS:
         raise InputError(f"method is {method!r}, wanted one of {', '.join(METHODS)}")

@@ -13,11 +13,14 @@ counts times their mean, so that only their ratios matter.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from math import sqrt
 from typing import Any
+
+import numpy as np
 
 from rift_cl.cl.elementwise import clip_negative
 from rift_cl.cl.reductions import dot
-from rift_cl.errors import InputError, checked_flag
+from rift_cl.errors import InputError, NonFiniteError, checked_flag
 from rift_cl.geometry.numbers import one_number
 from rift_cl.operators.linear import LinearOperator
 from rift_cl.reconstruct.solvers.data_term import DataTerm
@@ -25,6 +28,10 @@ from rift_cl.reconstruct.solvers.direction_weights import DirectionWeights
 from rift_cl.reconstruct.solvers.residual_weight import Precondition
 from rift_cl.reconstruct.solvers.solver import Solver, SolverState
 from rift_cl.reconstruct.solvers.tv_functional import TotalVariation
+
+# How far from the ends of a type's range values stay whose squares, beside weights and lengths,
+# are to be told from 0 and infinity.
+_CLEAR_OF_ENDS = 1e3
 
 
 @dataclass
@@ -69,6 +76,30 @@ class VariationSolver(Solver):
         self._strength = self._weight * data.mean_weight
         spacing = (1.0,) * len(A.domain) if A.grid is None else A.grid.spacing
         self.variation = TotalVariation(data.home, A.domain, spacing, direction_weights)
+        self._largest = data.norm_squared() or 1.0
+        self._check_range()
+
+    def _check_range(self) -> None:
+        """Make sure that squares of the data and of the image they tell of have room in the type.
+
+        Gradients of the image are squared to be shortened: of squares that are 0 or infinite
+        another image follows, which looks like one.
+
+        Raises:
+            NonFiniteError: they have none.
+        """
+        data, limits = self.data, np.finfo(self.data.dtype)
+        least = sqrt(float(limits.tiny)) * _CLEAR_OF_ENDS
+        most = sqrt(float(limits.max)) / _CLEAR_OF_ENDS
+        measured = data.rms(data.y)
+        pixels = max(int(np.prod(data.A.domain)), 1)
+        pictured = measured * sqrt(data.samples / pixels / self._largest)
+        for what, size in (("y holds", measured), ("the image holds", pictured)):
+            if size and not least < size < most:
+                raise NonFiniteError(
+                    f"{what} values of about {size:.1g}, whose squares leave the range of "
+                    f"{data.dtype}: scale y, the weight and lengths such that values are near 1"
+                )
 
     @property
     def weight(self) -> float:
