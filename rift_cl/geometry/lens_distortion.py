@@ -33,6 +33,8 @@ LENS_MODELS = {
     "RADIAL_FISHEYE": ("k1", "k2"),
     "OPENCV_FISHEYE": ("k1", "k2", "k3", "k4"),
     "THIN_PRISM_FISHEYE": ("k1", "k2", "p1", "p2", "k3", "k4", "sx1", "sy1"),
+    "SIMPLE_FISHEYE": (),
+    "FISHEYE": (),
 }
 _PINHOLES = ("SIMPLE_PINHOLE", "PINHOLE")
 # Far beyond any lens, and small enough that products of coefficients stay finite.
@@ -107,7 +109,7 @@ class Lens:
         terms = dict(zip(LENS_MODELS[self.model], self.coefficients, strict=True))
         if self.model == "FOV":
             return xy * _field_of_view(np.hypot(xy[..., 0], xy[..., 1]), terms["omega"])[..., None]
-        if self.model.endswith("_FISHEYE"):
+        if self.model.endswith("FISHEYE"):
             radius = np.hypot(xy[..., 0], xy[..., 1])
             angle = np.arctan(radius)
             xy = (
@@ -139,7 +141,7 @@ def lens_of(model: str, coefficients: Sequence[float], K: ArrayLike) -> Lens | N
         return None
     lens = Lens(model, tuple(coefficients), _intrinsics(K))
     # Without coefficients a fisheye is still one.
-    return lens if any(lens.coefficients) or model.endswith("_FISHEYE") else None
+    return lens if any(lens.coefficients) or model.endswith("FISHEYE") else None
 
 
 def _radial(model: str, terms: dict[str, float]) -> tuple[list[float], list[float]]:

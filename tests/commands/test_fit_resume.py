@@ -7,12 +7,14 @@ from __future__ import annotations
 
 import hashlib
 import json
+import shutil
 import subprocess
 import sys
 import time
 
 import numpy as np
 import pytest
+from PIL import Image
 
 from rift_cl.commands.cli import main
 from rift_cl.commands.fit_photos.job import Fit
@@ -106,6 +108,41 @@ def test_other_settings_cannot_go_on(capture, tmp_path, capsys):
         assert fit(capture, tmp_path / "fit", *other) == 3
         assert f"had {name.replace('-', '_')} {words}" in capsys.readouterr().err
         assert contents(tmp_path / "fit") == before
+
+
+def test_a_fit_goes_on_with_what_it_began_with_alone(capture, tmp_path, capsys):
+    """Photographs and cameras by their contents: a copy with other times is the same."""
+    given = {"steps": 100, "splats": 200, "hold_out": 4}
+    moved, fitted = tmp_path / "capture", tmp_path / "fit"
+    shutil.copytree(capture, moved)
+    poses = moved / "transforms.json"
+    photograph = moved / "2.png"
+    broken_off(settings(moved, fitted, **given), 25)
+    before = contents(fitted)
+    for file, spoilt, words in (
+        (photograph, _inverted, photograph.name),
+        (poses, _with_a_camera_moved, "the camera of"),
+    ):
+        kept = file.read_bytes()
+        spoilt(file)
+        assert fit(moved, fitted, "--resume", "--steps", "100") == 3
+        assert words in (said := capsys.readouterr().err) and "was changed" in said
+        assert contents(fitted).items() <= before.items()
+        file.write_bytes(kept)
+    assert fit(moved, fitted, "--resume", "--steps", "100") == 0
+    list(Fit(settings(capture, tmp_path / "whole", **given)).run())
+    assert digest(fitted) == digest(tmp_path / "whole")
+
+
+def _inverted(photograph):
+    pixels = np.asarray(Image.open(photograph).convert("RGB"))
+    Image.fromarray(255 - pixels).save(photograph)
+
+
+def _with_a_camera_moved(poses):
+    record = json.loads(poses.read_text())
+    record["frames"][1]["transform_matrix"][0][3] += 0.3
+    poses.write_text(json.dumps(record))
 
 
 @pytest.mark.full

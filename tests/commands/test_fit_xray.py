@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 
 import numpy as np
 import pytest
@@ -12,7 +13,7 @@ from rift_cl.commands.cli import main
 from rift_cl.commands.fit.kind import kind_of_fit
 from rift_cl.commands.fit_xray.job import XrayFit
 from rift_cl.commands.fit_xray.settings import FitXraySettings
-from rift_cl.errors import InputError, StoppedError
+from rift_cl.errors import CheckpointError, InputError, StoppedError
 from rift_cl.geometry.seen_grid import seen_grid
 from rift_cl.io.scans.formats import open_scan
 from rift_cl.io.volumes import read_volume, read_volume_place
@@ -120,6 +121,22 @@ def test_a_fit_that_was_broken_off_goes_on_to_the_same_bits(scans, tmp_path):
     assert not (cut / "scene.ply").exists()
     list(XrayFit(settings(path, cut, resume=True, **more)).run())
     assert (cut / "scene.ply").read_bytes() == (whole / "scene.ply").read_bytes()
+
+
+def test_a_fit_goes_on_with_the_scan_that_it_began_with_alone(scans, tmp_path):
+    path, out = tmp_path / "scan.npz", tmp_path / "fit"
+    shutil.copy(scans[1][0], path)
+    job = XrayFit(settings(path, out, checkpoint_every=20))
+    with pytest.raises(StoppedError):
+        for report in job.run():
+            if report.what == "steps" and report.done >= 25:
+                job.stop()
+    with np.load(path) as archive:
+        arrays = dict(archive)
+    arrays["projections"] = arrays["projections"] * 1.1
+    np.savez(path, **arrays)
+    with pytest.raises(CheckpointError, match=r"scan\.npz was changed since"):
+        list(XrayFit(settings(path, out, checkpoint_every=20, resume=True)).run())
 
 
 def test_a_dry_run_writes_nothing(scans, tmp_path, capsys):

@@ -24,7 +24,15 @@ FOCAL = 20.0
 NAMES = ["a.png", "b.png", "sub/c.png"]
 POINTS = np.array([[0.5, 0.25, -0.5], [1.0, -1.0, 2.0], [0.0, 0.5, 0.0], [3.0, 2.0, 1.0]])
 COLORS = np.array([[255, 0, 0], [0, 128, 0], [1, 2, 3], [255, 255, 255]], np.uint8)
-MODEL_NUMBERS = {"SIMPLE_PINHOLE": 0, "PINHOLE": 1, "OPENCV": 4, "FOV": 7}
+MODEL_NUMBERS = {
+    "SIMPLE_PINHOLE": 0,
+    "PINHOLE": 1,
+    "OPENCV": 4,
+    "FOV": 7,
+    "DIVISION": 13,
+    "SIMPLE_FISHEYE": 14,
+    "FISHEYE": 15,
+}
 
 PINHOLE = ("PINHOLE", [FOCAL, FOCAL + 1, 6.5, 4.25])
 

@@ -165,6 +165,22 @@ def test_what_is_no_json_object(tmp_path: Path, content: bytes) -> None:
         open_capture(tmp_path)
 
 
+def test_a_camera_model_that_is_not_read_is_named(tmp_path: Path) -> None:
+    for written in (made.colmap_text, made.colmap_binary):
+        written(tmp_path / written.__name__, ("DIVISION", [20.0, 21.0, 6.5, 4.25, 0.1]))
+        with pytest.raises(FileFormatError, match="'DIVISION' is not known.*image_undistorter"):
+            open_capture(tmp_path / written.__name__)
+
+
+@pytest.mark.parametrize(
+    ("name", "program"), [("poses.csv", "RealityCapture"), ("cameras.XML", "Metashape")]
+)
+def test_cameras_of_other_programs_have_a_way_out(tmp_path: Path, name: str, program: str) -> None:
+    (tmp_path / name).write_text("<document/>")
+    with pytest.raises(InputError, match=f"{program}, export them as a COLMAP model"):
+        open_capture(tmp_path / name)
+
+
 def test_what_is_no_capture(tmp_path: Path) -> None:
     for given, message in [
         (tmp_path / "gone", "no such file or folder"),

@@ -169,6 +169,19 @@ def test_names_of_several_words_that_end_in_a_number_in_a_text_model(tmp_path: P
     assert [view.name for view in again] == [view.name for view in views]
 
 
+@pytest.mark.parametrize("written", [made.colmap_text, made.colmap_binary])
+@pytest.mark.parametrize(
+    ("model", "parameters"),
+    [("SIMPLE_FISHEYE", [20.0, 6.5, 4.25]), ("FISHEYE", [20.0, 21.0, 6.5, 4.25])],
+)
+def test_fisheyes_without_coefficients_of_a_colmap_model(
+    tmp_path: Path, written: Callable, model: str, parameters: list[float]
+) -> None:
+    view = open_capture(written(tmp_path, (model, parameters)), photographs=False).views[0]
+    np.testing.assert_array_equal(view.camera.K[:2, 2], parameters[-2:])
+    assert view.lens == Lens(model, (), view.camera.K)
+
+
 def test_a_name_that_is_a_number_in_a_text_model(tmp_path: Path) -> None:
     path = made.colmap_text(tmp_path) / "images.txt"
     lines = [line for line in path.read_text().replace("a.png", "0001").split("\n") if line]

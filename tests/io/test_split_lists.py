@@ -32,6 +32,11 @@ A, B, C = (f"images/{name}" for name in ("a.png", "b.png", "sub/c.png"))
             [f"1 photographs, such as {C}, are listed to be trained"],
         ),
         (
+            {"train_filenames": [A, "c.png"], "test_filenames": ["b.png"]},
+            ["train", "test", "train"],
+            [],
+        ),
+        (
             {"train_filenames": [A, B], "test_filenames": ["images/d.png"]},
             ["train", "train", "none"],
             ["1 names in the lists of photographs, such as images/d.png", "in no list"],

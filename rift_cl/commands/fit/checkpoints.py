@@ -10,12 +10,14 @@ from __future__ import annotations
 
 import time
 import warnings
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from rift_cl import __version__
+from rift_cl.commands.fit.inputs import FitInput
 from rift_cl.errors import CheckpointError
 from rift_cl.io.checkpoint import Checkpoint, newest_checkpoint, save_checkpoint
 from rift_cl.train.trainer import Trainer
@@ -68,6 +70,7 @@ class FitCheckpoints:
             "device": device,
         }
         self._found: Checkpoint | None = None
+        self._inputs: tuple[FitInput, ...] = ()
         self.history: History = []
         self.decided: dict[str, Any] = decisive
 
@@ -94,6 +97,10 @@ class FitCheckpoints:
         self._found = found
         return True
 
+    def fitted(self, inputs: Sequence[FitInput]) -> None:
+        """Say what the fit is fitted to, before ``restore`` or ``save``."""
+        self._inputs = tuple(inputs)
+
     def save(self, trainer: Trainer, losses: Losses) -> None:
         """Write one.
 
@@ -103,7 +110,9 @@ class FitCheckpoints:
         arrays = trainer.state()
         if losses:
             arrays["losses"] = np.array(losses, float)
-        facts = {**self._facts, "decided": self.decided, "history": self.history}
+        inputs = [each.digest for each in self._inputs]
+        more = {"decided": self.decided, "history": self.history, "inputs": inputs}
+        facts = {**self._facts, **more}
         save_checkpoint(self.folder, Checkpoint(trainer.parameters.step, arrays, facts))
 
     def restore(self, trainer: Trainer) -> Losses:
@@ -111,10 +120,14 @@ class FitCheckpoints:
 
         Returns:
             The losses up to there.
+
+        Raises:
+            CheckpointError: it is of a fit to other things (``fitted``).
         """
         found, self._found = self._found, None
         if found is None:
             return []
+        self._compare_inputs(found.facts.get("inputs"))
         arrays = dict(found.arrays)
         losses = arrays.pop("losses", np.empty((0, 2)))
         trainer.restore(arrays)
@@ -144,6 +157,23 @@ class FitCheckpoints:
                     f"{self._facts[name]!r}: the last bits may differ",
                     stacklevel=3,
                 )
+
+    def _compare_inputs(self, before: Any) -> None:
+        """Make sure that what is fitted is what was fitted up to the checkpoint."""
+        now = [each.digest for each in self._inputs]
+        if before is None or before == now:
+            return
+        changed = "what is fitted"
+        if isinstance(before, list) and len(before) == len(now):
+            changed = next(
+                each.name
+                for each, was in zip(self._inputs, before, strict=True)
+                if each.digest != was
+            )
+        raise CheckpointError(
+            f"{self.folder}: {changed} was changed since the fit to resume began: put back what "
+            "was there, name another --out, or begin anew with --overwrite"
+        )
 
     def _stages(self, found: Checkpoint) -> History:
         """The stages before the one that begins or goes on now."""

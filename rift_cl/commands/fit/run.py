@@ -12,6 +12,7 @@ from typing import Any, Generic, TypeVar
 
 from rift_cl.cl.discovery import open_device
 from rift_cl.commands.fit.checkpoints import CheckpointSchedule, FitCheckpoints
+from rift_cl.commands.fit.inputs import FitInput
 from rift_cl.commands.fit.settings import FitSettings
 from rift_cl.commands.fit_photos.scores import ViewScore
 from rift_cl.commands.run_folder.run_folder import RunFolder
@@ -83,8 +84,14 @@ class FitRun(ABC, Generic[S]):
         """Break off after the step that is being taken; ``run`` then keeps a checkpoint."""
         self._stopping = True
 
+    @abstractmethod
+    def _inputs(self) -> list[FitInput]:
+        """What is fitted, by its contents."""
+
     def _begin(self, trainer: Trainer) -> None:
         """Bring the trainer to where the fit goes on, or make the folder that of a new one."""
+        if self.settings.checkpoint_every or self.settings.resume:
+            self.checkpoints.fitted(self._inputs())
         self.checkpoints.decided = self.settled.decisive()
         if self.settings.resume:
             self.losses = self.checkpoints.restore(trainer)

@@ -10,6 +10,7 @@ from rift_cl.commands.cameras.arc import check_places, place_notes
 from rift_cl.commands.cameras.fit_cameras import CAMERA_FILES, save_fit_cameras, with_poses
 from rift_cl.commands.cameras.photograph_place import place_record
 from rift_cl.commands.export.fit_page import leave_page
+from rift_cl.commands.fit.inputs import FitInput, photograph_inputs
 from rift_cl.commands.fit.probe import TRIED, probed, time_words
 from rift_cl.commands.fit.run import FitRun
 from rift_cl.commands.fit_photos.bare_input import BareInput
@@ -282,6 +283,9 @@ class Fit(FitRun[FitPhotosSettings]):
         self.folder.finish(
             self.settled, self.metrics, page, self.device, asked=settings, **self.decided
         )
+
+    def _inputs(self) -> list[FitInput]:
+        return photograph_inputs([*self.training_views, *self.test_views])
 
     def _score(
         self, name: str, views: tuple[View, ...], trainer: Trainer, training: CapturePictures

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from rift_cl.commands.fit.inputs import FitInput, scan_inputs
 from rift_cl.commands.fit.probe import TRIED, probed, time_words
 from rift_cl.commands.fit.run import FitRun
 from rift_cl.commands.fit_photos.report import history_notes
@@ -133,6 +134,9 @@ class XrayFit(FitRun[FitXraySettings]):
             **score_record(self.scores),
         }
         self._leave(splats, volume, whole)
+
+    def _inputs(self) -> list[FitInput]:
+        return scan_inputs(self.settings, self.settings.out)
 
     def _read(self) -> Projections:
         """The projections, after what is to be said of them."""

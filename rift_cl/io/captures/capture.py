@@ -35,6 +35,13 @@ __all__ = [
 ]
 
 # NeRF's synthetic scenes have a file for each part; the first is what is trained on.
+# Whose cameras files with these endings usually are.
+_PROGRAMS = {
+    ".csv": "RealityCapture",
+    ".nvm": "VisualSFM",
+    ".out": "Bundler",
+    ".xml": "Metashape",
+}
 _TRANSFORMS = ("transforms.json", "transforms_train.json")
 
 
@@ -150,6 +157,14 @@ def _transforms(path: Path) -> Path | None:
         raise InputError(f"{path}: there is no such file or folder")
     if not path.is_dir():
         if path.suffix.lower() != ".json":
-            raise InputError(f"{path}: a capture is a .json file or a folder")
+            raise InputError(f"{path}: a capture is a .json file or a folder{_way_out(path)}")
         return path
     return next((path / name for name in _TRANSFORMS if (path / name).is_file()), None)
+
+
+def _way_out(path: Path) -> str:
+    """What to do with the cameras of a program whose files are not read; the end of a sentence."""
+    program = _PROGRAMS.get(path.suffix.lower())
+    if program is None:
+        return ""
+    return f"; if it holds cameras of {program}, export them as a COLMAP model and name its folder"

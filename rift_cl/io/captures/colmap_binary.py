@@ -18,7 +18,7 @@ import numpy as np
 from rift_cl.errors import FileFormatError
 from rift_cl.io.boundary import check_claim, reading
 from rift_cl.io.captures.colmap_records import (
-    CAMERA_MODELS,
+    MODEL_NAMES,
     CameraRecord,
     ImageRecord,
     PointRecords,
@@ -42,7 +42,7 @@ def read_cameras(path: Path) -> list[CameraRecord]:
         InputError: there is no such file.
         FileFormatError: it is damaged, or a camera model is unknown.
     """
-    names = dict(enumerate(CAMERA_MODELS))
+    names = dict(enumerate(MODEL_NAMES))
     cameras = []
     with _opened(path) as file:
         for index in range(file.count("cameras", _CAMERA.size)):

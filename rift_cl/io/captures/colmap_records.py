@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from rift_cl.errors import FileFormatError
 
-# Focal lengths and coefficients of each camera model; its place in this order is its number.
+# Focal lengths and coefficients of each camera model.
 CAMERA_MODELS = {
     "SIMPLE_PINHOLE": (1, 0),
     "PINHOLE": (2, 0),
@@ -22,7 +22,16 @@ CAMERA_MODELS = {
     "SIMPLE_RADIAL_FISHEYE": (1, 1),
     "RADIAL_FISHEYE": (1, 2),
     "THIN_PRISM_FISHEYE": (2, 8),
+    "SIMPLE_FISHEYE": (1, 0),
+    "FISHEYE": (2, 0),
 }
+# All that COLMAP 4 has, those that are not known among them: a place in this order is a number.
+MODEL_NAMES = (
+    *("SIMPLE_PINHOLE", "PINHOLE", "SIMPLE_RADIAL", "RADIAL", "OPENCV", "OPENCV_FISHEYE"),
+    *("FULL_OPENCV", "FOV", "SIMPLE_RADIAL_FISHEYE", "RADIAL_FISHEYE", "THIN_PRISM_FISHEYE"),
+    *("RAD_TAN_THIN_PRISM_FISHEYE", "SIMPLE_DIVISION", "DIVISION", "SIMPLE_FISHEYE", "FISHEYE"),
+    *("EUCM", "EQUIRECTANGULAR"),
+)
 
 
 @dataclass(frozen=True)
@@ -76,7 +85,7 @@ def parameter_count(where: str, model: str) -> int:
     if model not in CAMERA_MODELS:
         raise FileFormatError(
             f"{where}: the camera model {model[:40]!r} is not known; known are "
-            f"{', '.join(CAMERA_MODELS)}"
+            f"{', '.join(CAMERA_MODELS)}; COLMAP's image_undistorter makes photographs of a PINHOLE"
         )
     focals, coefficients = CAMERA_MODELS[model]
     return focals + 2 + coefficients

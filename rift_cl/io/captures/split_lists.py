@@ -1,12 +1,14 @@
 """nerfstudio's lists of photographs: 'train_filenames', 'val_filenames', 'test_filenames'.
 
 A photograph of the last two is held out. One that no list names is trained on where nothing is
-said of training, held out where nothing else is said, and left alone where both are.
+said of training, held out where nothing else is said, and left alone where both are. A list may
+leave out the folders of a photograph, where no other has its name.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections import Counter
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path, PurePosixPath
 
@@ -29,13 +31,27 @@ def split_by_lists(top: Fields, views: Sequence[View]) -> tuple[tuple[View, ...]
     lists = {name: top.texts(name) for name in (_TRAINED, *_SCORED) if name in top}
     if not any(lists.values()):
         return tuple(views), []
-    trained = {_plain(name) for name in lists.get(_TRAINED, ())}
-    scored = {_plain(name) for list_ in _SCORED for name in lists.get(list_, ())}
+    whole = _by_last_name(views)
+    trained = {whole(name) for name in lists.get(_TRAINED, ())}
+    scored = {whole(name) for list_ in _SCORED for name in lists.get(list_, ())}
     named: dict[str, Split] = dict.fromkeys(trained, "train")
     named |= dict.fromkeys(scored, "test")
     other: Split = "train" if not trained else "none" if scored else "test"
     found = tuple(replace(view, split=_split(view.name, named, other)) for view in views)
     return found, _notes(top, found, trained & scored, named)
+
+
+def _by_last_name(views: Sequence[View]) -> Callable[[str], str]:
+    """What brings a name of a list into the form of those of the views, with their folders."""
+    counts = Counter(PurePosixPath(_plain(view.name)).name for view in views)
+    only = {PurePosixPath(name).name: name for name in (_plain(view.name) for view in views)}
+    known = {form(view.name) for view in views for form in (_plain, _bare)}
+
+    def whole(name: str) -> str:
+        plain = _plain(name)
+        return only[plain] if plain not in known and counts[plain] == 1 else plain
+
+    return whole
 
 
 def _split(name: str, named: dict[str, Split], other: Split) -> Split:

@@ -197,7 +197,7 @@ def _aperture(fields: Fields) -> Aperture | None:
 def _crop_radius(fields: Fields, model: str) -> float | None:
     """The circle that a fisheye fills; of other lenses nerfstudio does not heed it either."""
     radius = fields.number(_CROP)
-    if radius is None or not model.endswith("_FISHEYE"):
+    if radius is None or not model.endswith("FISHEYE"):
         return None
     if radius <= 0:
         raise InputError(
@@ -239,7 +239,7 @@ def _model(fields: Fields) -> str:
             f"{fields.where}: 'camera_model' is {reprlib.repr(model)}, known are "
             f"{', '.join(_MODELS)}"
         )
-    if "is_fisheye" in fields and fisheye != model.endswith("_FISHEYE"):
+    if "is_fisheye" in fields and fisheye != model.endswith("FISHEYE"):
         raise FileFormatError(
             f"{fields.where}: 'camera_model' is {model} and 'is_fisheye' {str(fisheye).lower()}, "
             "which contradict each other; leave out the wrong one"

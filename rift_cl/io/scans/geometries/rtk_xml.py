@@ -47,7 +47,11 @@ def read_rtk(path: Path, pitch: tuple[float, float] | None, unit: str = "") -> V
             raise FileFormatError(f"{path}: defines entities, which no geometry of RTK's needs")
         root = ElementTree.fromstring(text)
     if not root.tag.startswith("RTKThreeDCircularGeometry"):
-        raise FileFormatError(f"{path}: is no geometry of RTK's, its root is {root.tag[:40]!r}")
+        cameras = "; cameras of Metashape are read as the COLMAP model that it exports"
+        raise FileFormatError(
+            f"{path}: is no geometry of RTK's, its root is {root.tag[:40]!r}"
+            f"{cameras if root.tag == 'document' else ''}"
+        )
     if _number(path, root, "RadiusCylindricalDetector", 0.0):
         raise InputError(f"{path}: its detector is curved, vectors describe flat ones alone")
     if pitch is None:
