@@ -168,7 +168,7 @@ def test_what_is_no_json_object(tmp_path: Path, content: bytes) -> None:
 def test_a_camera_model_that_is_not_read_is_named(tmp_path: Path) -> None:
     for written in (made.colmap_text, made.colmap_binary):
         written(tmp_path / written.__name__, ("DIVISION", [20.0, 21.0, 6.5, 4.25, 0.1]))
-        with pytest.raises(FileFormatError, match="'DIVISION' is not known.*image_undistorter"):
+        with pytest.raises(FileFormatError, match=r"'DIVISION' is not known.*image_undistorter"):
             open_capture(tmp_path / written.__name__)
 
 

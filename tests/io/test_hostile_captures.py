@@ -83,7 +83,7 @@ def test_the_name_of_an_image_has_an_end(tmp_path: Path) -> None:
         open_capture(tmp_path)
 
 
-@pytest.mark.parametrize("model", [-1, 11, 2**31 - 1])
+@pytest.mark.parametrize("model", [-1, 18, 2**31 - 1])
 def test_a_camera_model_of_no_known_number(tmp_path: Path, model: int) -> None:
     path = colmap(tmp_path) / "cameras.bin"
     content = path.read_bytes()
