@@ -55,6 +55,24 @@ def test_nikon_is_what_cil_reads(tmp_path: Path) -> None:
     assert bin == pytest.approx(4.5 - u / 0.2, abs=0.02)
 
 
+def test_nikon_stage_aside_is_told_where_it_bends_the_rows(tmp_path: Path) -> None:
+    path = made.nikon(tmp_path)
+    text = path.read_text()
+    told = {}
+    for offset in (0, 5, 15):
+        path.write_text(text.replace("[Xrays]", f"ObjectOffsetX={offset}\n[Xrays]"))
+        told[offset] = [note for note in read_beam(path).notes if "ObjectOffsetX" in note]
+    assert not told[0] and not told[5]
+    # Angles between the ray to an end of the row and the one through the axis: as they are from the
+    # foot in the middle, and as they are seen on a detector that stands across the latter.
+    toward = math.atan2(15, 50)
+    bend = max(
+        abs(200 * math.tan(math.atan2(end, 200) - toward) - (end - 15 * 200 / 50)) / 0.2
+        for end in (-1, 1)
+    )
+    assert bend > 0.4 and f"up to {bend:.2g} bins off" in told[15][0]
+
+
 def turned(point: np.ndarray, angle: float) -> np.ndarray:
     """A point turned about z: between two zeros of the angle, and to the axis beside the beam."""
     cosine, sine = math.cos(angle), math.sin(angle)

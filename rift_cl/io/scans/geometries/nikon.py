@@ -3,7 +3,9 @@
 The signs are those that CIL reads (its ``NikonDataReader``, release 24): radiographs are stored as
 they are seen from behind the detector, the first row on top, so that slices are numbered from the
 top; the centre of rotation is an offset on the detector at the top and at the bottom row, in
-millimetres; and the object turns so that our angles fall. Angles in ``.ang`` or ``_ctdata.txt``
+millimetres; and the object turns so that our angles fall. A stage that stands aside
+(``ObjectOffsetX``) is read as a detector shifted to the other side, which is not quite the same: it
+is told where that matters. Angles in ``.ang`` or ``_ctdata.txt``
 beside it are taken where there is one to each projection, else they are even.
 """
 
@@ -26,6 +28,8 @@ _NUMBER = re.compile(r"[-+]?\d+(?:\.\d*)?(?:[eE][-+]?\d+)?")
 _LARGEST = 64 << 20
 # Angles that are off even steps by less than this, in steps, are worth no word.
 _EVEN = 0.5
+# Rays off by less than this at the ends of the rows, in bins, are worth no word.
+_BEND = 0.25
 
 
 def read_nikon(path: Path) -> Beam:
@@ -41,7 +45,7 @@ def read_nikon(path: Path) -> Beam:
         raise FileFormatError(f"{path}: a pixel of {min(pitch):g} is no size")
     to_axis, to_detector = file.number("SrcToObject"), file.number("SrcToDetector")
     offset, lean = _axis(file, rows * pitch[0], to_detector / max(to_axis, 1e-30))
-    offset += file.number("DetectorOffsetX", 0.0)
+    shift = file.number("DetectorOffsetX", 0.0)
     views = file.whole("Projections")
     angles, notes = _angles(file, views)
     tilt = file.number("ObjectTilt", 0.0)
@@ -50,13 +54,20 @@ def read_nikon(path: Path) -> Beam:
             f"The tilt of the axis along the beam, {tilt:g} degrees, is not used: give vectors "
             "with geometry= (--geometry) to include it."
         )
+    if file.text("ObjectOffsetX"):
+        notes += _aside(
+            offset,
+            (-bins * pitch[1] / 2 - shift, bins * pitch[1] / 2 - shift),
+            to_detector,
+            pitch[1],
+        )
     notes += _hardening(file)
     return Beam(
         source_to_axis=to_axis,
         source_to_detector=to_detector,
         pitch=pitch,
         unit="mm",
-        offset=(file.number("DetectorOffsetY", 0.0) / pitch[0], offset / pitch[1]),
+        offset=(file.number("DetectorOffsetY", 0.0) / pitch[0], (offset + shift) / pitch[1]),
         lean=lean,
         shape=(rows, bins),
         angles=angles,
@@ -66,6 +77,30 @@ def read_nikon(path: Path) -> Beam:
         prefix=file.text("Name"),
         notes=tuple(notes),
     )
+
+
+def _aside(axis: float, ends: tuple[float, float], to_detector: float, bin_: float) -> list[str]:
+    """A word where a stage that stands aside bends the rows by more than may be left out.
+
+    Args:
+        axis: where the axis is seen in a row, in millimetres from the source's foot.
+        ends: of the row, likewise.
+        to_detector: distance of the source from the detector, in millimetres.
+        bin_: width of a bin, in millimetres.
+    """
+    # The foot stays where it was, so that the detector leans against the line from the source to
+    # the axis. A ray to s makes an angle with that line whose tangent is
+    # (s - axis) to_detector / (to_detector^2 + s axis), not (s - axis) / to_detector.
+    square = to_detector * to_detector
+    bend = max(abs((s - axis) * s * axis) / max(square + s * axis, 1e-30) for s in ends) / bin_
+    if bend < _BEND:
+        return []
+    return [
+        f"The axis stands aside of the beam's middle (ObjectOffsetX), which is read as a shift of "
+        f"the detector: rays are up to {bend:.2g} bins off at the ends of the rows, and an axis or "
+        "a tilt that is looked for goes wrong with them; give vectors with geometry= (--geometry) "
+        "for exact places."
+    ]
 
 
 def _hardening(file: IniFile) -> list[str]:
