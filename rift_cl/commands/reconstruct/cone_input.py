@@ -229,6 +229,7 @@ class ConeInput:
             averaged = f"Blocks of {block} x {n} (rows x bins) detector pixels were averaged."
             self.notes.append(f"{averaged} {lost}".rstrip())
         self.notes += self.clean.notes() + self._pitch_note() + self._orbit_note()
+        self.notes += self._helix_note()
         if any(self.beyond):
             self.notes.append(self._beyond_note())
         if self.scan.background:
@@ -246,6 +247,17 @@ class ConeInput:
             f"Doubt: the geometry has the source's orbit at row {cone.center[0]:g}, off the "
             f"detector's rows 0 to {rows - 1}: 'center' is the row of the orbit and then the bin "
             "of the axis."
+        ]
+
+    def _helix_note(self) -> list[str]:
+        """What of a helix nothing checks: no opposite rays lie in one plane across the axis."""
+        cone = self.file.cone
+        if not isinstance(cone, Cone) or cone.circular:
+            return []
+        return [
+            "The source moves along the axis: the sense of rotation, the sign of the heights and, "
+            "unless --center says it, the axis are those of the file, and were not checked against "
+            "the data."
         ]
 
     def _pitch_note(self) -> list[str]:
