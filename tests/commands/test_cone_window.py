@@ -23,7 +23,7 @@ def part(right):
     return ReconstructSettings(scan=Path("scan.npz"), roi=(3, right, 4, 50))
 
 
-def test_a_part_that_an_axis_off_the_middle_makes_room_for_is_not_refused_before_it_is_known():
+def test_a_part_that_an_axis_off_the_middle_makes_room_for_is_not_refused_early():
     assert VolumeWindow.of(part(60), cone(21.5), settled=False).roi == (3, 60, 4, 50)
     with pytest.raises(InputError, match="lines 0 to 44"):
         VolumeWindow.of(part(60), cone(21.5))

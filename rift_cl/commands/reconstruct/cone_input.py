@@ -270,9 +270,8 @@ class ConeInput:
         if not isinstance(cone, Cone) or cone.circular:
             return []
         return [
-            "The source moves along the axis: the sense of rotation, the sign of the heights and, "
-            "unless --center says it, the axis are those of the file, and were not checked against "
-            "the data."
+            "The source moves along the axis: the sense of rotation, the sign of the heights and "
+            "the place of the axis were taken as given, and not checked against the data."
         ]
 
     def _pitch_note(self) -> list[str]:
