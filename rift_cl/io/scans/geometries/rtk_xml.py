@@ -53,7 +53,8 @@ def read_rtk(path: Path, pitch: tuple[float, float] | None, unit: str = "") -> V
     if pitch is None:
         raise InputError(
             f"{path}: RTK's geometry does not say how large a pixel is, nor do the projections; "
-            "--pitch only replaces a size that is known: write a file of ours with 'geometry: geometry.xml' and 'pitch: [ROW, BIN]', and give "
+            "--pitch only replaces a size that is known: "
+            "write a file of ours with 'geometry: geometry.xml' and 'pitch: [ROW, BIN]', and give "
             "it with geometry= (--geometry)"
         )
     common = [_number(path, root, name, 0.0) for name in _NAMES]
