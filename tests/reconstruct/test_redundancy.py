@@ -93,6 +93,7 @@ def test_a_short_scan_weighs_by_places_on_the_circle(first, sense):
     expected = short_scan(angles - first, gamma, (span - np.pi) / 2)
     np.testing.assert_allclose(counted.rays, expected, atol=1e-9)
     assert "short scan" in counted.sentence
+    assert f"no views in the other {np.degrees(2 * np.pi - span):.3g} of" in counted.sentence
 
 
 def test_unsorted_views_keep_their_weights():

@@ -56,8 +56,16 @@ class VolumeWindow:
     slices: tuple[int, int]
 
     @classmethod
-    def of(cls, settings: ReconstructSettings, scan: Cone | Vectors) -> VolumeWindow:
+    def of(
+        cls, settings: ReconstructSettings, scan: Cone | Vectors, *, settled: bool = True
+    ) -> VolumeWindow:
         """What the settings ask for.
+
+        Args:
+            settings: the part that is wanted.
+            scan: the geometry.
+            settled: whether its axis is final; a part is refused before only if it will be outside
+                wherever on the detector the axis is.
 
         Raises:
             InputError: a part is not inside the volume, or the volume holds the source.
@@ -68,7 +76,10 @@ class VolumeWindow:
             whole = Grid((whole.shape[0], *across), whole.spacing, whole.center)
         size, count = whole.shape[-1], whole.shape[0]
         roi = settings.roi or (0, size, 0, size)
-        check_window(roi, size)
+        # The volume is widest about an axis at the detector's edge.
+        known = settled or settings.size is not None
+        widest = 2 * scan.bins * scan_lengths(scan).pixel[1] / whole.spacing[-1]
+        check_window(roi, size if known else max(size, math.ceil(widest - 1e-6)))
         slices = settings.rows or (0, count)
         if not 0 <= slices[0] < slices[1] <= count:
             raise InputError(
@@ -77,7 +88,8 @@ class VolumeWindow:
             )
         window = cls(whole, roi, slices)
         corner, source = window.reach, scan_lengths(scan).source_to_axis
-        if corner >= source:
+        # About another axis the columns of a part lie elsewhere, while a whole volume only grows.
+        if corner >= source and (known or settings.roi is None):
             raise InputError(
                 f"the volume reaches {corner:g} from the axis, and the source is {source:g} away: "
                 "it would be inside; reconstruct less (--size, --roi), or mend the distances "
@@ -145,7 +157,10 @@ class ConeInput:
         self.axis: dict[str, Any] = {}
         # Made now, so that what does not fit is told before any work.
         self.geometry = self._geometry()
-        self.window = VolumeWindow.of(settings, self.geometry)
+        # Vectors and helices have their axis from the file.
+        circle = isinstance(self.geometry, Cone) and self.geometry.circular
+        settled = settings.center is not None or not circle
+        self.window = VolumeWindow.of(settings, self.geometry, settled=settled)
         # Slices below the volume and above it that rays meet, where the object goes on there.
         self.beyond = 0, 0
         self._check_memory()
@@ -229,6 +244,7 @@ class ConeInput:
             averaged = f"Blocks of {block} x {n} (rows x bins) detector pixels were averaged."
             self.notes.append(f"{averaged} {lost}".rstrip())
         self.notes += self.clean.notes() + self._pitch_note() + self._orbit_note()
+        self.notes += self._helix_note()
         if any(self.beyond):
             self.notes.append(self._beyond_note())
         if self.scan.background:
@@ -246,6 +262,16 @@ class ConeInput:
             f"Doubt: the geometry has the source's orbit at row {cone.center[0]:g}, off the "
             f"detector's rows 0 to {rows - 1}: 'center' is the row of the orbit and then the bin "
             "of the axis."
+        ]
+
+    def _helix_note(self) -> list[str]:
+        """What of a helix nothing checks: no opposite rays lie in one plane across the axis."""
+        cone = self.file.cone
+        if not isinstance(cone, Cone) or cone.circular:
+            return []
+        return [
+            "The source moves along the axis: the sense of rotation, the sign of the heights and "
+            "the place of the axis were taken as given, and not checked against the data."
         ]
 
     def _pitch_note(self) -> list[str]:

@@ -172,8 +172,9 @@ class CorrectionOptions:
     """Beam hardening of one material: coefficients a1 a2 ... of the polynomial a1 y + a2 y^2 + ...
     that makes line integrals y proportional to thickness. Default: off."""
     binning: int = 1
-    """Average blocks of N detector rows and N bins first; --center, --rows, --pitch and --tilt
-    still refer to the detector before binning."""
+    """Average blocks of N detector rows and N bins first; --center, --pitch and --tilt still
+    refer to the detector before binning, and so does --rows, except for cones, whose --rows are
+    slices of the volume after binning."""
     delta_beta: Auto[float] = None
     """Phase retrieval after Paganin et al. (2002) for a parallel beam and one material: the ratio
     delta / beta of its refractive index; needs --energy, --propagation and a pitch in a unit of

@@ -278,7 +278,8 @@ def beam_words(geometry: Geometry, unit: str) -> str:
     row, bin = geometry.center
     curved = "curved detector, " if geometry.curved else ""
     rise = float(np.ptp(geometry.heights))
-    helix = f", the source rises by {rise:.4g}{of}" if rise else ""
+    moves = "rises" if geometry.heights[-1] >= geometry.heights[0] else "falls"
+    helix = f", the source {moves} by {rise:.4g}{of}" if rise else ""
     return (
         f"cone beam, {lengths}, {curved}axis at bin {bin:.2f}, orbit plane at row {row:.2f}{helix}"
     )

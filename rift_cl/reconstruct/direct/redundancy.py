@@ -120,7 +120,8 @@ def redundancy(scan: Fan | Cone, compensate: str | None = None) -> Redundancy:
         )
     excess = max((span - np.pi) / 2, 0.0)
     sentence = (
-        f"short scan of {degrees(span):.4g} degrees: Parker's weights, half-angle "
+        f"short scan of {degrees(span):.4g} degrees, no views in the other "
+        f"{degrees(2 * np.pi - span):.3g} of the turn: Parker's weights, half-angle "
         f"{degrees(excess):.3g} degrees"
     )
     if sees_further(center, scan.bins):

@@ -56,7 +56,8 @@ def read_rtk(path: Path, pitch: tuple[float, float] | None, unit: str = "") -> V
         raise InputError(f"{path}: its detector is curved, vectors describe flat ones alone")
     if pitch is None:
         raise InputError(
-            f"{path}: RTK's geometry does not say how large a pixel is, nor do the projections: "
+            f"{path}: RTK's geometry does not say how large a pixel is, nor do the projections; "
+            "--pitch only replaces a size that is known: "
             "write a file of ours with 'geometry: geometry.xml' and 'pitch: [ROW, BIN]', and give "
             "it with geometry= (--geometry)"
         )
