@@ -157,7 +157,7 @@ class ConeInput:
         self.axis: dict[str, Any] = {}
         # Made now, so that what does not fit is told before any work.
         self.geometry = self._geometry()
-        # Vectors and helices have their axis from the file.
+        # No axis is looked for where there are vectors or a helix.
         circle = isinstance(self.geometry, Cone) and self.geometry.circular
         settled = settings.center is not None or not circle
         self.window = VolumeWindow.of(settings, self.geometry, settled=settled)
