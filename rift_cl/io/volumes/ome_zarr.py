@@ -11,7 +11,6 @@ that says ``complete: true`` every chunk was written, and one that is missing is
 
 from __future__ import annotations
 
-import json
 import math
 import re
 from collections.abc import Iterator
@@ -20,7 +19,6 @@ from itertools import product
 from pathlib import Path
 from typing import Any
 
-import numcodecs
 import numpy as np
 import zarr
 from numpy.typing import NDArray
@@ -31,11 +29,12 @@ from rift_cl.io.output import staged_folder, writing
 from rift_cl.io.volumes.layout import PART, Floats, VolumeLayout, VolumePlace, WriteSlab
 from rift_cl.io.volumes.sample_window import restored, suggested_window
 from rift_cl.io.volumes.slice_statistics import SliceStatistics
+from rift_cl.io.volumes.zarr_chunks import ChunkedArray, Index, in_threads, write_header
 from rift_cl.io.zarr_store import check_codecs, check_entries, read_header
 
+Shape = tuple[int, ...]
+
 _CHUNK = (PART, 256, 256)
-# Packing of chunks: nearly as fast as none, and every reader of Zarr has it.
-_COMPRESSOR = {"id": "blosc", "cname": "zstd", "clevel": 1, "shuffle": 2, "blocksize": 0}
 # Slices of the coarsest copy from which the range to display is taken.
 _LOOKED_AT = 16
 # Our own entry among the attributes.
@@ -49,18 +48,18 @@ def staged_volume(path: Path, layout: VolumeLayout) -> Iterator[WriteSlab]:
     statistics = SliceStatistics(layout.shape[0])
     with staged_folder(path, _strange) as folder:
         with writing(path):
-            _write_json(folder / ".zgroup", {"zarr_format": 2})
-            _write_json(folder / ".zattrs", {_OURS: {**layout.attributes, "complete": False}})
+            write_header(folder / ".zgroup", {"zarr_format": 2})
+            write_header(folder / ".zattrs", {_OURS: {**layout.attributes, "complete": False}})
             levels = _Levels(folder, layout)
 
         def write_slab(start: int, slab: NDArray[Any]) -> None:
-            with writing(path), _one_thread():
+            with writing(path):
                 levels.write(start, slab)
 
         yield statistics.watching(write_slab)
         with writing(path):
             shown = _display(layout, statistics.range, levels.coarsest)
-            _write_json(folder / ".zattrs", _attributes(path, layout, shown))
+            write_header(folder / ".zattrs", _attributes(path, layout, shown))
 
 
 def load_volume(path: Path, *, budget: int | None) -> Floats:
@@ -94,32 +93,13 @@ def load_place(path: Path) -> VolumePlace:
     return VolumePlace.of(ours if isinstance(ours, dict) else {})
 
 
-def _create(place: Path, shape: tuple[int, ...], layout: VolumeLayout) -> Any:
+def _create(place: Path, shape: Shape, layout: VolumeLayout) -> ChunkedArray:
     """A new array of a store, of which every chunk will be written, zeros too."""
-    chunks = [min(n, chunk) for n, chunk in zip(shape, _CHUNK, strict=True)]
-    place.mkdir()
-    header = {
-        "zarr_format": 2,
-        "shape": list(shape),
-        "chunks": chunks,
-        "dtype": layout.dtype.str if layout.dtype.itemsize > 1 else "|u1",
-        "order": "C",
-        "dimension_separator": "/",
-        "compressor": _COMPRESSOR,
-        "filters": None,
-        "fill_value": 0,
-    }
-    _write_json(place / ".zarray", header)
     # The name under which xarray looks for the axes.
     attributes: dict[str, Any] = {"_ARRAY_DIMENSIONS": ["z", "y", "x"]}
     if layout.window is not None:
         attributes |= layout.window.attributes
-    _write_json(place / ".zattrs", attributes)
-    config = getattr(zarr, "config", None)
-    if config is None:
-        return zarr.open_array(str(place), mode="r+", write_empty_chunks=True)
-    with config.set({"array.write_empty_chunks": True}):
-        return zarr.open_array(str(place), mode="r+", zarr_format=2)
+    return ChunkedArray(place, shape, _CHUNK, layout.dtype, attributes)
 
 
 class _Levels:
@@ -141,11 +121,15 @@ class _Levels:
     @property
     def coarsest(self) -> NDArray[Any]:
         """The coarsest copy."""
-        return np.asarray(self._arrays[-1][...])
+        last = self._arrays[-1]
+        whole = np.empty(last.shape, last.dtype)
+        for index in last.indices(slice(0, last.shape[0])):
+            whole[last.extent(index)] = last.read_chunk(index)
+        return whole
 
     def write(self, start: int, slab: NDArray[Any]) -> None:
         """Write slices of the volume, and what they complete of the copies."""
-        self._arrays[0][start : start + len(slab)] = slab
+        self._arrays[0].write_slices(start, slab)
         self._wrote(0, slice(start, start + len(slab)))
 
     def _wrote(self, level: int, slices: slice) -> None:
@@ -165,30 +149,33 @@ class _Levels:
 
     def _halve(self, level: int, slices: slice) -> None:
         """Write slices of the level above, chunk by chunk."""
-        finer, coarser, factors = (
-            self._arrays[level],
-            self._arrays[level + 1],
-            self._factors[level],
-        )
-        for chunk in _chunks(slices, coarser.shape, coarser.chunks):
-            source = tuple(
-                slice(f * part.start, min(f * part.stop, n))
-                for part, f, n in zip(chunk, factors, finer.shape, strict=True)
-            )
-            coarser[chunk] = halved(np.asarray(finer[source]), factors)
+        finer, coarser = self._arrays[level], self._arrays[level + 1]
+        factors = self._factors[level]
+
+        def make(index: Index) -> None:
+            extent = coarser.extent(index)
+            chunk = np.empty([part.stop - part.start for part in extent], coarser.dtype)
+            for below in _chunks_below(index, factors, finer):
+                # Chunks have an even length along axes that are halved, but for the last.
+                place = tuple(
+                    slice(at.start // f - part.start, -(-at.stop // f) - part.start)
+                    for at, f, part in zip(finer.extent(below), factors, extent, strict=True)
+                )
+                chunk[place] = halved(finer.read_chunk(below), factors)
+            coarser.write_chunk(index, chunk)
+
+        in_threads(make, coarser.indices(slices))
 
 
-def _chunks(
-    slices: slice, shape: tuple[int, ...], chunks: tuple[int, ...]
-) -> Iterator[tuple[slice, ...]]:
-    """The chunks of an array that slices of one depth of them lie in."""
-    starts = (range(0, n, chunk) for n, chunk in zip(shape[1:], chunks[1:], strict=True))
-    for corner in product(*starts):
-        frame = (
-            slice(at, min(at + chunk, n))
-            for at, chunk, n in zip(corner, chunks[1:], shape[1:], strict=True)
+def _chunks_below(index: Index, factors: Shape, finer: ChunkedArray) -> Iterator[Index]:
+    """The chunks of an array of which a chunk of its copy is made."""
+    counts = (-(-n // chunk) for n, chunk in zip(finer.shape, finer.chunks, strict=True))
+    return product(
+        *(
+            range(f * i, min(f * (i + 1), count))
+            for i, f, count in zip(index, factors, counts, strict=True)
         )
-        yield slices, *frame
+    )
 
 
 def _attributes(path: Path, layout: VolumeLayout, shown: dict[str, float]) -> dict[str, Any]:
@@ -234,21 +221,6 @@ def _display(
     return {"min": range[0], "max": range[1], "start": start, "end": end}
 
 
-@contextmanager
-def _one_thread() -> Iterator[None]:
-    """Blosc puts blocks down in the order in which its threads end: one thread, one order."""
-    before = numcodecs.blosc.use_threads
-    numcodecs.blosc.use_threads = False
-    try:
-        yield
-    finally:
-        numcodecs.blosc.use_threads = before
-
-
-def _write_json(path: Path, value: dict[str, Any]) -> None:
-    path.write_text(json.dumps(value, indent=2, allow_nan=False) + "\n", encoding="utf-8")
-
-
 def _finest(path: Path) -> tuple[dict[str, Any], Path]:
     """Attributes of a store, and where its finest array is: of Zarr 2 and 3, group or array."""
     if (path / "zarr.json").is_file():
@@ -292,8 +264,6 @@ def _strange(names: list[str]) -> str | None:
         return names[0]
     return strange
 
-
-Shape = tuple[int, ...]
 
 # Copies end where no axis is longer than this,
 _SMALL = 256
