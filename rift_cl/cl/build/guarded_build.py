@@ -144,12 +144,14 @@ def _answer(
 ) -> tuple[str, dict[str, Any] | None, Buffer]:
     """What a child makes of a request, which half of the time ``until`` is left for; see ``ask``.
 
-    A compiler dies of a launch whatever its numbers are. The kernel itself may die of what does not
-    fit together, as numbers and the zeros of its buffers do, or of numbers that are all zero; so
-    that a launch which passes in one of these ways has been compiled.
+    A compiler dies of a launch whatever its numbers are. The kernel itself may die of numbers that
+    are all zero, or of what does not fit together, as numbers and the zeros of its buffers do; so
+    that a launch which passes in one of these ways has been compiled. Zeros come first: by them
+    most kernels have nothing to do, while one that looks for the end of a list in zeros may go
+    through them for as long as its numbers allow.
     """
     found: tuple[str, dict[str, Any] | None, Buffer] = ("", None, b"")
-    tries = [request.launches, list(map(without_numbers, request.launches))]
+    tries = [list(map(without_numbers, request.launches)), request.launches]
     for launches in tries if request.launches else [()]:
         asked = request._replace(launches=launches)._asdict()
         found = worker.answer(asked, _half_of_what_is_left(until))
