@@ -12,7 +12,9 @@ import pytest
 import scan_files as made
 
 from rift_cl.errors import FileFormatError, InputError, ShapeError
-from rift_cl.io import ScanFile, open_scan
+from rift_cl.io import ScanFile, open_scan, scan_of_arrays
+
+VIEWS = made.counts(6, 4, 5, dtype="<f4")
 
 
 def whole(scan: ScanFile) -> np.ndarray:
@@ -162,6 +164,22 @@ def test_data_exchange_rows_have_a_pitch_of_their_own(tmp_path: Path) -> None:
     assert open_scan(path).row_pitch == 1.25
 
 
+@pytest.mark.parametrize("value", [0.0, -1.0, np.nan, np.inf])
+def test_a_size_that_is_none_has_no_unit(tmp_path: Path, value: float) -> None:
+    path = tmp_path / "a.h5"
+    made.data_exchange(path)
+    sized(path, "measurement/instrument/detector/actual_pixel_size_x", value)
+    scan = open_scan(path)
+    assert (scan.pitch, scan.row_pitch, scan.unit) == (None, None, "")
+    assert any("--pitch" in note and f"{value:g}" in note for note in scan.notes)
+    lengths = {"pitch": [2.0, value], "unit": np.array("mm")}
+    np.savez(tmp_path / "a.npz", projections=VIEWS, angles=np.arange(6) / 2, **lengths)
+    scan = open_scan(tmp_path / "a.npz", kind="attenuation")
+    assert (scan.pitch, scan.row_pitch, scan.unit) == (None, None, "")
+    scan = scan_of_arrays(path, VIEWS, np.arange(6) / 2, pitch=value, row_pitch=2.0, unit="mm")
+    assert (scan.pitch, scan.row_pitch, scan.unit) == (None, None, "")
+
+
 def test_several_nxtomo_scans_must_be_told_apart(tmp_path: Path) -> None:
     path = tmp_path / "a.nxs"
     made.nxtomo(path, group="first")
@@ -239,7 +257,8 @@ def test_npz_pitches_are_read_as_those_of_cones(
         told = {"unit": np.array(unit)} if unit else {}
         np.savez(tmp_path / "a.npz", **stack, **names, **told)
         scan = open_scan(tmp_path / "a.npz", kind="attenuation")
-        assert (scan.row_pitch, scan.pitch, scan.unit) == (*expected, unit)
+        assert (scan.row_pitch, scan.pitch) == expected
+        assert scan.unit == (unit if scan.pitch else "")
     if None not in expected:
         np.savez(tmp_path / "b.npz", **stack, **names, **told, sid=50.0, sdd=200.0)
         cone = open_scan(tmp_path / "b.npz", kind="attenuation")

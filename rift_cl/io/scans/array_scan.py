@@ -13,7 +13,7 @@ from rift_cl.cl.host_arrays import as_real_array
 from rift_cl.errors import ShapeError
 from rift_cl.geometry.scan_value import checked_angles
 from rift_cl.io.scans.literals import Kind
-from rift_cl.io.scans.scan_file import Frames, Part, ScanFile, ScanRows, check_angles
+from rift_cl.io.scans.scan_file import Frames, Part, Pitches, ScanFile, ScanRows, check_angles
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,7 +67,7 @@ def scan_of_arrays(
         kind: what the values are; counts where there are flats, else attenuation, when not given.
         pitch: distance between bins in ``unit``, where it is known.
         row_pitch: that between rows, where it is another one.
-        unit: unit of length.
+        unit: unit of length; nothing without a pitch that is one.
         notes: what had to be assumed, a sentence each.
 
     Raises:
@@ -83,16 +83,17 @@ def scan_of_arrays(
     ]
     directions = as_real_array(angles, name="angles").astype(np.float64).ravel()
     directions = check_angles(path, "angles", directions, projections=len(stack))
+    lengths = Pitches(row_pitch, pitch, unit).usable
     return ScanFile(
         path=path,
         shape=(stack.shape[0], stack.shape[1], stack.shape[2]),
         angles=checked_angles(str(path), directions),
-        pitch=pitch,
-        unit=unit,
+        pitch=lengths.bin,
+        unit=lengths.unit,
         kind=kind or ("attenuation" if flats is None else "counts"),
         source=f"{path.suffix} by a registered reader",
         rows=ArrayRows(stack, *others),
-        row_pitch=row_pitch,
+        row_pitch=lengths.row,
         notes=tuple(notes),
     )
 

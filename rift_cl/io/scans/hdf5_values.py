@@ -14,7 +14,7 @@ from rift_cl.io.hdf5_tree import Hdf5Tree
 from rift_cl.io.scans.angle_list import AngleList, stated_unit
 from rift_cl.io.scans.axes import spelled
 from rift_cl.io.scans.beam import PARALLEL_BELOW, Beam
-from rift_cl.io.scans.scan_file import Pitches
+from rift_cl.io.scans.scan_file import Pitches, usable_pitch
 
 # Eight million frames: no scan has more, and a forged header may not ask for gigabytes.
 _LONGEST_VECTOR = 64 << 20
@@ -74,6 +74,11 @@ def read_pitches(
     """
     if bin is None:
         return Pitches(), ()
+    if usable_pitch(bin[0]) is None:
+        return Pitches(), (
+            f"The size of a pixel that the file tells, {bin[0]:g}, is no length: it is not used "
+            "(--pitch).",
+        )
     height = None if row is None else in_unit(row, bin[1])
     notes: tuple[str, ...] = ()
     if row is not None and height is None:

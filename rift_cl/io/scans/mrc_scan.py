@@ -135,7 +135,7 @@ def open_mrc_scan(path: Path, request: ScanRequest, *, budget: int | None) -> Sc
         evidence=(path.stem,),
         pitch=pixel.bin,
         row_pitch=pixel.row,
-        unit=pixel.unit if pixel.bin else "",
+        unit=pixel.unit,
         notes=(note, *doubts),
         advice=_ADVICE,
     )

@@ -51,6 +51,7 @@ def own_layout(store: ArrayStore, source: str, dataset: str | None = None) -> La
     in_small = {name.lower(): name for name in store.beside("")}
     lengths = _pitches(store, in_small)
     beam, notes = _beam(store, in_small, lengths)
+    usable = lengths.usable
     return Layout(
         source=source,
         projections=dataset or usual[0],
@@ -60,9 +61,9 @@ def own_layout(store: ArrayStore, source: str, dataset: str | None = None) -> La
         axes=USUAL if known else None,
         angle_unit="radians" if "angles" in store else "degrees",
         search=True,
-        pitch=lengths.usable.bin,
-        row_pitch=lengths.usable.row,
-        unit=lengths.unit,
+        pitch=usable.bin,
+        row_pitch=usable.row,
+        unit=usable.unit,
         beam=beam,
         notes=(*called, *notes),
     )

@@ -43,10 +43,11 @@ class Pitches(NamedTuple):
 
     @property
     def usable(self) -> Pitches:
-        """The same without numbers that are no sizes, and without rows where bins have none."""
+        """The same without numbers that are no sizes; without one of bins, nothing at all."""
         bin = None if self.bin is None else usable_pitch(self.bin)
-        row = None if self.row is None or bin is None else usable_pitch(self.row)
-        return Pitches(row, bin, self.unit)
+        if bin is None:
+            return Pitches()
+        return Pitches(None if self.row is None else usable_pitch(self.row), bin, self.unit)
 
 
 @dataclass(frozen=True, eq=False)
