@@ -15,18 +15,22 @@ _LENGTHS = {
     "angstrom": ("angstrom", 1e-10),
     "inch": ("inch", 0.0254),
 }
-_ALIASES = {
-    **{name: unit for unit, (name, _) in _LENGTHS.items()},
-    **{name.replace("meter", "metre"): unit for unit, (name, _) in _LENGTHS.items()},
+# Other signs, in which capitals count: mm is none of Mm, and Um is neither.
+_SIGNS = {
     "\u00b5m": "um",  # the micro sign
     "\u03bcm": "um",  # the Greek letter
-    "micron": "um",
-    "microns": "um",
     "\u00c5": "angstrom",  # the letter
     "\u212b": "angstrom",  # the sign
     "A": "angstrom",
     "in": "inch",
 }
+# Words, in small letters, for one and for several.
+_SINGULAR = {
+    **{name: unit for unit, (name, _) in _LENGTHS.items()},
+    **{name.replace("meter", "metre"): unit for unit, (name, _) in _LENGTHS.items()},
+    "micron": "um",
+}
+_WORDS = {**_SINGULAR, **{f"{name}s": unit for name, unit in _SINGULAR.items()}, "inches": "inch"}
 
 
 class LengthUnit(NamedTuple):
@@ -37,8 +41,12 @@ class LengthUnit(NamedTuple):
 
 
 def length_unit(unit: str) -> LengthUnit | None:
-    """The unit of length that a word or a sign stands for; None where it stands for none."""
-    found = _LENGTHS.get(_ALIASES.get(unit.strip(), unit.strip()))
+    """The unit of length that a word or a sign stands for; None where it stands for none.
+
+    Words may be in capitals and in the plural ("Microns"); of signs, capitals are other signs.
+    """
+    sign = unit.strip()
+    found = _LENGTHS.get(_SIGNS.get(sign, sign)) or _LENGTHS.get(_WORDS.get(sign.lower(), ""))
     return None if found is None else LengthUnit(*found)
 
 

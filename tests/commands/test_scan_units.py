@@ -138,6 +138,40 @@ def test_a_pitch_without_a_unit_is_said_to_have_none(
     assert settings_of(tmp_path / "0")["unit"] == ""
 
 
+def in_unit(tmp_path: Path, unit: str, pitch: float = 50.0) -> Path:
+    """A scan whose file says its pitch in a unit."""
+    path = tmp_path / "scan.npz"
+    angles = np.arange(VIEWS) * np.pi / VIEWS
+    np.savez(path, projections=disc(), angles=angles, pitch=pitch, unit=np.array(unit))
+    return path
+
+
+@pytest.mark.parametrize("unit", ["micrometers", "MICRONS", "Micron", "Micrometres", "um"])
+def test_words_for_units_may_be_capital_and_plural(tmp_path: Path, unit: str) -> None:
+    scan = with_lengths(open_scan(in_unit(tmp_path, unit), kind="attenuation"), None, "mm")
+    assert scan.pitch == pytest.approx(0.05) and scan.unit == "mm"
+
+
+@pytest.mark.parametrize("unit", ["Mm", "Um", "M", "a", "um/px", "pixel"])
+def test_a_unit_that_is_not_known_is_not_given_another_name(tmp_path: Path, unit: str) -> None:
+    file = open_scan(in_unit(tmp_path, unit), kind="attenuation")
+    with pytest.raises(InputError, match="--pitch"):
+        with_lengths(file, None, "mm")
+    scan = with_lengths(file, 0.05, "mm")
+    assert scan.unit == "mm" and repr(unit) in scan.notes[-1]
+    np.savez(
+        tmp_path / "fan.npz",
+        projections=disc()[:, :1],
+        angles=np.arange(VIEWS) / 7,
+        sid=60.0,
+        sdd=120.0,
+        pitch=2.0,
+        unit=np.array(unit),
+    )
+    with pytest.raises(InputError, match="--geometry"):
+        with_lengths(open_scan(tmp_path / "fan.npz", kind="attenuation"), 0.05, "mm")
+
+
 @pytest.mark.parametrize("rows", [1, 3])
 def test_a_fan_and_a_cone_are_converted_whole(tmp_path: Path, rows: int) -> None:
     lengths = {"source_to_axis": 60.0, "source_to_detector": 120.0, "pitch": 2.0}

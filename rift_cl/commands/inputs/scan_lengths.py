@@ -34,8 +34,9 @@ def with_lengths(
         to the file's as the one that was given is to ``pitch``.
 
     Raises:
-        InputError: the unit is none of length, it has no length to belong to, the pitch has no
-            unit beside a file that has one, or the one between rows is no length or is a cone's.
+        InputError: the unit is none of length, it has no length to belong to or none in a unit
+            that is known, the pitch has no unit beside a file that has one, or the one between
+            rows is no length or is a cone's.
     """
     scan = _in_unit(scan, pitch, unit)
     return scan if row_pitch is None else with_row_pitch(scan, row_pitch, pitch)
@@ -101,11 +102,34 @@ def _in_unit(scan: ScanFile, pitch: float | None, unit: str | None) -> ScanFile:
         )
     if scan.unit in (unit, ""):
         return dataclasses.replace(scan, unit=unit)
-    if own is None or wanted is None:
+    if wanted is None:
         note = f"Lengths in {scan.unit}, the file's unit, were taken to be in {unit} (--unit)."
         return dataclasses.replace(scan, unit=unit, notes=(*scan.notes, note))
+    if own is None:
+        return _in_place_of_unknown(scan, pitch, unit)
     # Of powers of ten, exactly: 1e-3 / 1e-6 is not 1000.
     return _converted(scan, unit, float(f"{own.metres / wanted.metres:.12g}"))
+
+
+def _in_place_of_unknown(scan: ScanFile, pitch: float | None, unit: str) -> ScanFile:
+    """The scan in a unit where its own is not known, so that nothing can be converted.
+
+    Raises:
+        InputError: no other length takes the place of the file's.
+    """
+    parallel = scan.fan is None and scan.cone is None
+    if pitch is None or not parallel:
+        remedy = (
+            f"--pitch, the distance between detector bins in {unit}"
+            if parallel
+            else "--geometry, a file with all lengths in one of them"
+        )
+        raise InputError(
+            f"{scan.path}: its lengths are in {scan.unit!r}, which is none of {known_units()}, so "
+            f"that --unit {unit} cannot convert them: give {remedy}"
+        )
+    note = f"The file's lengths are in {scan.unit!r}, a unit that is not known: --pitch is used."
+    return dataclasses.replace(scan, unit=unit, notes=(*scan.notes, note))
 
 
 def _converted(scan: ScanFile, unit: str, factor: float) -> ScanFile:
