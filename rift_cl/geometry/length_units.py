@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from typing import NamedTuple
 
 # Units of length: the UDUNITS name and the length in metres.
@@ -31,6 +32,7 @@ _SINGULAR = {
     "micron": "um",
 }
 _WORDS = {**_SINGULAR, **{f"{name}s": unit for name, unit in _SINGULAR.items()}, "inches": "inch"}
+_LENGTH = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(.*?)\s*", re.ASCII)
 
 
 class LengthUnit(NamedTuple):
@@ -48,6 +50,15 @@ def length_unit(unit: str) -> LengthUnit | None:
     sign = unit.strip()
     found = _LENGTHS.get(_SIGNS.get(sign, sign)) or _LENGTHS.get(_WORDS.get(sign.lower(), ""))
     return None if found is None else LengthUnit(*found)
+
+
+def length_of(text: str) -> tuple[float, str] | None:
+    """The number and the unit of a text such as "50 um"; None where it begins with no number.
+
+    The unit is empty where the text has none, and may be none of length.
+    """
+    found = _LENGTH.fullmatch(text)
+    return None if found is None else (float(found[1]), found[2])
 
 
 def known_units() -> str:

@@ -3,9 +3,10 @@
 Attributes of variable length hold the place of their text in a *global heap*: ``GCOL``, and then
 one object after the other, each with its size. The library goes from object to object by these
 sizes, and for ever where one of them is zero (seen with HDF5 2.0; nothing in Python ends that). So
-the heaps that an object's attributes lead to are walked here first. After the HDF5 file format
-specification, versions 1.1 to 3.0, sections III.E and IV.A. Attributes that a file keeps outside
-the object's header, as it does from nine on in newer files, are not looked at.
+the heaps that an object's attributes, or a dataset of one text, lead to are walked here first.
+After the HDF5 file format specification, versions 1.1 to 3.0, sections III.E and IV.A. Attributes
+that a file keeps outside the object's header, as it does from nine on in newer files, are not
+looked at.
 """
 
 from __future__ import annotations
@@ -35,13 +36,37 @@ def check_heaps(node: Any) -> None:
     Raises:
         FileFormatError: one has none.
     """
-    name, base = node.file.filename, node.file.id.get_create_plist().get_userblock()
-    with open(name, "rb") as file:  # noqa: PTH123 - h5py gives text or bytes
+    with open(node.file.filename, "rb") as file:  # noqa: PTH123 - h5py gives text or bytes
+        base = _base(node)
         for attribute in _attributes(file, base, h5py.h5o.get_info(node.id).addr):
-            for at in range(0, len(attribute) - 7, 4):
-                (address,) = struct.unpack_from("<Q", attribute, at)
-                if _bytes(file, base + address, 4) == _HEAP and not _ends(file, base + address):
-                    raise FileFormatError(f"{name}: the heap of its texts is damaged")
+            _check_places(file, base, attribute)
+
+
+def check_text_heap(node: Any) -> None:
+    """Make sure that the heap to which a dataset of one text of variable length leads has an end.
+
+    Args:
+        node: an h5py dataset that is stored in one piece, as h5py stores texts.
+
+    Raises:
+        FileFormatError: it has none.
+    """
+    place = node.id.get_offset()
+    with open(node.file.filename, "rb") as file:  # noqa: PTH123 - h5py gives text or bytes
+        _check_places(file, _base(node), _bytes(file, place, _HEAD))
+
+
+def _base(node: Any) -> int:
+    base: int = node.file.id.get_create_plist().get_userblock()
+    return base
+
+
+def _check_places(file: BinaryIO, base: int, content: bytes) -> None:
+    """Follow whatever may be the place of a heap."""
+    for at in range(0, len(content) - 7, 4):
+        (address,) = struct.unpack_from("<Q", content, at)
+        if _bytes(file, base + address, 4) == _HEAP and not _ends(file, base + address):
+            raise FileFormatError(f"{os.fsdecode(file.name)}: the heap of its texts is damaged")
 
 
 def _ends(file: BinaryIO, place: int) -> bool:

@@ -20,6 +20,7 @@ import scan_files as made
 from rift_cl.errors import FileFormatError, ResourceLimitError, RiftError
 from rift_cl.io import ScanFile, open_scan
 from rift_cl.io.hdf5_tree import open_tree
+from rift_cl.io.scans.hdf5_values import read_length
 
 
 def grown() -> int:
@@ -96,6 +97,20 @@ def test_a_heap_of_texts_without_end(tmp_path: Path, headers: str, user_block: i
     path.write_bytes(whole[:heap] + bytes(16) + whole[heap + 16 :])
     with open_tree(path) as tree, pytest.raises(FileFormatError, match=r"a\.h5: the heap"):
         tree.dataset("angles")
+
+
+@pytest.mark.parametrize("user_block", [0, 512])
+def test_a_heap_of_a_length_without_end(tmp_path: Path, user_block: int) -> None:
+    path, size = tmp_path / "a.h5", "instrument/x_pixel_size"
+    with h5py.File(path, "w", userblock_size=user_block) as file:
+        file[size] = 40 * " " + "50 um"
+    with open_tree(path) as tree:
+        assert read_length(tree, size) == (50, "um")
+    whole = path.read_bytes()
+    heap = whole.index(b"GCOL") + 16
+    path.write_bytes(whole[:heap] + bytes(16) + whole[heap + 16 :])
+    with open_tree(path) as tree, pytest.raises(FileFormatError, match=r"a\.h5: the heap"):
+        read_length(tree, size)
 
 
 def test_terabytes_in_a_kilobyte_of_npz(tmp_path: Path) -> None:

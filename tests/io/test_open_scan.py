@@ -180,6 +180,31 @@ def test_a_size_that_is_none_has_no_unit(tmp_path: Path, value: float) -> None:
     assert (scan.pitch, scan.row_pitch, scan.unit) == (None, None, "")
 
 
+@pytest.mark.parametrize(
+    ("text", "pitch", "unit"),
+    [
+        ("50 um", 50, "um"),
+        (np.bytes_("50"), 50, ""),
+        ("5e1micrometers ", 50, "micrometers"),
+        ("about 50", None, ""),
+        (2000 * "5", None, ""),
+        (["50 um", "50 um"], None, ""),
+    ],
+)
+def test_a_size_that_is_a_text(tmp_path: Path, text: Any, pitch: float | None, unit: str) -> None:
+    path = tmp_path / "a.h5"
+    made.data_exchange(path)
+    name = "measurement/instrument/detector/actual_pixel_size_x"
+    with h5py.File(path, "a") as file:
+        file[name] = text
+    scan = open_scan(path)
+    assert (scan.pitch, scan.unit) == (pitch, unit)
+    assert any("--pitch" in note for note in scan.notes) == (pitch is None)
+    with h5py.File(path, "a") as file:
+        file[name].attrs["units"] = "mm"
+    assert open_scan(path).unit == (unit or (pitch and "mm") or "")
+
+
 def test_several_nxtomo_scans_must_be_told_apart(tmp_path: Path) -> None:
     path = tmp_path / "a.nxs"
     made.nxtomo(path, group="first")

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import math
 
+import h5py
 import numpy as np
 from numpy.typing import NDArray
 
 from rift_cl.errors import ShapeError
-from rift_cl.geometry.length_units import length_unit
+from rift_cl.geometry.length_units import length_of, length_unit
 from rift_cl.io.boundary import check_claim, check_numeric
+from rift_cl.io.hdf5_heaps import check_text_heap
 from rift_cl.io.hdf5_tree import Hdf5Tree
 from rift_cl.io.scans.angle_list import AngleList, stated_unit
 from rift_cl.io.scans.axes import spelled
@@ -18,6 +20,8 @@ from rift_cl.io.scans.scan_file import Pitches, usable_pitch
 
 # Eight million frames: no scan has more, and a forged header may not ask for gigabytes.
 _LONGEST_VECTOR = 64 << 20
+# Bytes of a text that is a length, at most.
+_LONGEST_TEXT = 1000
 
 
 def numeric_shape(tree: Hdf5Tree, name: str) -> tuple[int, ...]:
@@ -57,10 +61,33 @@ def read_vector(tree: Hdf5Tree, name: str) -> NDArray[np.float64]:
 
 
 def read_length(tree: Hdf5Tree, name: str) -> tuple[float, str] | None:
-    """The first number of a dataset and its unit, or None where there is no such dataset."""
+    """The first number of a dataset and its unit, or None where there is no such dataset.
+
+    A text is read as a number, with its unit behind it or as the attribute ``units``; the number is
+    NaN where it is no such text.
+    """
     if tree.find(name) is None:
         return None
-    return float(read_vector(tree, name)[0]), unit_of(tree, name)
+    unit = unit_of(tree, name)
+    if h5py.check_string_dtype(tree.dataset(name).dtype) is None:
+        return float(read_vector(tree, name)[0]), unit
+    value, own = length_of(_read_text(tree, name)) or (math.nan, "")
+    return value, own or unit
+
+
+def _read_text(tree: Hdf5Tree, name: str) -> str:
+    """The text of a dataset, empty where it holds several or none, or is stored in chunks.
+
+    Raises:
+        FileFormatError: the heap that keeps it is damaged.
+    """
+    node = tree.dataset(name)
+    if node.size != 1 or node.id.get_offset() is None or node.dtype.itemsize > _LONGEST_TEXT:
+        return ""
+    if h5py.check_string_dtype(node.dtype).length is None:
+        check_text_heap(node)
+    text = _decoded(np.asarray(node[()]).item())
+    return text if len(text) <= _LONGEST_TEXT else ""
 
 
 def read_pitches(
@@ -162,8 +189,11 @@ def unit_of(tree: Hdf5Tree, name: str) -> str:
 
 def _attribute(tree: Hdf5Tree, name: str, key: str) -> str:
     value = tree.dataset(name).attrs.get(key, "")
-    if isinstance(value, np.ndarray) and value.size == 1:
-        value = value.item()
+    return _decoded(value.item() if isinstance(value, np.ndarray) and value.size == 1 else value)
+
+
+def _decoded(value: object) -> str:
+    """A text as h5py gives it; empty where it is none."""
     if isinstance(value, bytes):
         value = value.decode(errors="replace")
     return value if isinstance(value, str) else ""
