@@ -456,3 +456,29 @@ def test_frames_of_the_same_size_that_are_not_used_are_named(tmp_path: Path) -> 
     assert "--darks" in told
     named = open_scan(path, darks="a/shutter")
     assert "not used" not in " ".join(named.notes)
+
+
+def bright_counts(pixels: str) -> np.ndarray:
+    """Counts of a beam of 10000 on 64 bins, some pixels of which read 65535, or all too much."""
+    data = np.repeat(np.rint(1e4 * np.exp(-lines())), 2, axis=2)
+    if pixels == "stuck":
+        data[:, :, 20] = 65535
+    if pixels == "zingers":
+        data.reshape(-1)[::90] = 65535
+    return 3 * data if pixels == "all" else data
+
+
+@pytest.mark.parametrize("pixels", ["none", "stuck", "zingers", "all"])
+def test_single_bright_pixels_do_not_speak_against_flats(tmp_path: Path, pixels: str) -> None:
+    path = hdf5(
+        tmp_path / "a.h5",
+        **{"exchange/data": bright_counts(pixels).astype("u2"), "exchange/theta": DEGREES},
+        **{"exchange/data_white": np.full((2, ROWS, 2 * BINS), 10000, "u2")},
+    )
+    if pixels == "all":
+        with pytest.raises(InputError, match=r"times as bright.*zingers"):
+            open_scan(path)
+        return
+    scan = open_scan(path)
+    assert scan.kind == "counts"
+    assert any("--zingers" in note for note in scan.notes) == (pixels != "none")

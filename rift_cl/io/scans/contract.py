@@ -227,9 +227,11 @@ def _kind(
             raise InputError(_wants_flats(found, seen))
         return "counts", ()
     if found.flats:
-        doubt = _no_counts_of(found, seen)
+        beam = _level(found, "flats")
+        dark = _level(found, "darks") if found.darks else 0.0
+        doubt = _no_counts_of(found, seen, beam, dark)
         if doubt is None:
-            return "counts", ()
+            return "counts", _few_bright(found, seen, beam, dark)
         if request.flats is not None or possible_kinds(seen) == ("counts",):
             raise InputError(
                 f"{found.path}: {doubt}; name other flats with flats= (--flats), or say what the "
@@ -334,10 +336,15 @@ def _wants_flats(found: Finding, seen: Sample) -> str:
     )
 
 
-def _no_counts_of(found: Finding, seen: Sample) -> str | None:
-    """Why flats cannot be those of the projections, or None."""
-    bright = _level(found, "flats")
-    dark = _level(found, "darks") if found.darks else 0.0
+def _no_counts_of(found: Finding, seen: Sample, bright: float, dark: float) -> str | None:
+    """Why flats cannot be those of the projections, or None.
+
+    Args:
+        found: the scan.
+        seen: values of its projections.
+        bright: how bright the flats are.
+        dark: how bright the darks are; 0 without any.
+    """
     beam = bright - dark
     if not beam > 0:
         # Where projections are no brighter either, rows say so when they are corrected.
@@ -348,12 +355,22 @@ def _no_counts_of(found: Finding, seen: Sample) -> str | None:
             f"{found.name} ({seen}) is far below the flats' {bright:.4g}, as data are that were "
             "divided by flats before"
         )
-    if seen.high - dark > _BRIGHTER * beam:
+    if seen.bright - dark > _BRIGHTER * beam:
         return (
             f"{found.name} ({seen}) is more than {_BRIGHTER:g} times as bright as the flats, "
-            f"{bright:.4g}"
+            f"{bright:.4g}, in too many places for zingers and stuck pixels"
         )
     return None
+
+
+def _few_bright(found: Finding, seen: Sample, bright: float, dark: float) -> tuple[str, ...]:
+    """A doubt about single values that no beam explains; arguments as for ``_no_counts_of``."""
+    if seen.high - dark <= _BRIGHTER * (bright - dark):
+        return ()
+    return (
+        f"Doubt: a few values of {found.name} ({seen}) are more than {_BRIGHTER:g} times as bright "
+        f"as the flats, {bright:.4g}: zingers, which --zingers 6 takes out, or stuck pixels.",
+    )
 
 
 def _level(found: Finding, part: str) -> float:
@@ -434,11 +451,11 @@ def _white(found: Finding, seen: Sample) -> NDArray[np.float64]:
     """
     assert found.beam is not None
     level = float(found.beam.white or 0)
-    if not 0 < level < float("inf") or seen.high > _BRIGHTER * level:
+    if not 0 < level < float("inf") or seen.bright > _BRIGHTER * level:
         raise InputError(
             f"{found.path}: the beam is said to be {level:g} counts, and {found.name} has "
-            f"{seen.high:.4g}: name the flats (--flats), or give --flats air where the bins at "
-            "both ends of the detector see nothing but air"
+            f"{seen.bright:.4g} and more in one value of 20: name the flats (--flats), or give "
+            "--flats air where the bins at both ends of the detector see nothing but air"
         )
     white = np.full(found.shape[0], level)
     white.flags.writeable = False

@@ -59,6 +59,7 @@ class Sample:
         dtype: type of the values as they are stored.
         low: their 0.5th percentile.
         high: their 99.5th percentile.
+        bright: their 95th percentile, which zingers and a few stuck pixels leave as it is.
         ends: median of the outermost bins at the left and at the right.
         peaks: what these are at most in 19 of 20 lines, at the left and at the right.
         middle: median of the middle half of the bins.
@@ -69,6 +70,7 @@ class Sample:
     dtype: np.dtype[np.generic]
     low: float
     high: float
+    bright: float
     ends: tuple[float, float]
     peaks: tuple[float, float]
     middle: float
@@ -103,16 +105,17 @@ def sampled(values: NDArray[np.float32], dtype: np.dtype[np.generic]) -> Sample:
     finite = lines[~np.isnan(lines)]
     if not finite.size:
         nothing = (0.0, 0.0)
-        return Sample(dtype, 0.0, 0.0, nothing, nothing, 0.0, whole=False, zeros=0.0)
+        return Sample(dtype, 0.0, 0.0, 0.0, nothing, nothing, 0.0, whole=False, zeros=0.0)
     bins = lines.shape[-1]
     edge = max(1, round(_END * bins))
     left, right = lines[..., :edge], lines[..., -edge:]
     outer = np.concatenate([left.ravel(), right.ravel()])
-    low, high = np.percentile(finite, [0.5, 99.5], method="nearest")
+    low, bright, high = np.percentile(finite, [0.5, 95, 99.5], method="nearest")
     return Sample(
         dtype=dtype,
         low=float(low),
         high=float(high),
+        bright=float(bright),
         ends=(_median(left), _median(right)),
         peaks=(_peak(left), _peak(right)),
         middle=_median(lines[..., bins // 4 : max(bins - bins // 4, bins // 4 + 1)]),
