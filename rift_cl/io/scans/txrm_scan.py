@@ -12,6 +12,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 import olefile
@@ -20,7 +21,7 @@ from numpy.typing import NDArray
 from rift_cl.errors import DTypeError, FileFormatError, InputError
 from rift_cl.io.boundary import check_claim, reading
 from rift_cl.io.scans.angle_list import AngleList, given_angles
-from rift_cl.io.scans.beam import Beam
+from rift_cl.io.scans.beam import PARALLEL_BELOW, Beam
 from rift_cl.io.scans.beam_file import given_beam
 from rift_cl.io.scans.contract import Finding, scan_of
 from rift_cl.io.scans.scan_file import Frames, Part, ScanFile, ScanRequest, ScanRows, usable_pitch
@@ -35,6 +36,13 @@ _MOVED = 0.1
 _MOST, _WIDEST = 1 << 20, 1 << 16
 
 
+class Reference(NamedTuple):
+    """The stream of a reference image: its name, and the type of a sample."""
+
+    name: str
+    dtype: str
+
+
 @dataclass(frozen=True)
 class TxrmRows:
     """Reads rows of a scan in a TXRM file (a ``RowSource``); images are read one after another.
@@ -43,7 +51,7 @@ class TxrmRows:
         path: the file.
         shape: (angle, row, bin).
         dtype: type of a sample as it is stored.
-        flats: name of the stream of the beam without the sample, or None.
+        flats: stream of the beam without the sample, or None.
         darks: None; the format keeps none.
         budget: bytes that one reading may take; 60 % of the free memory when None.
     """
@@ -51,7 +59,7 @@ class TxrmRows:
     path: Path
     shape: tuple[int, int, int]
     dtype: str
-    flats: str | None
+    flats: Reference | None
     darks: None
     budget: int | None
 
@@ -66,7 +74,7 @@ class TxrmRows:
                 found[view] = self._image(ole, image_name(view))[start:stop]
             flats = None
             if self.flats is not None:
-                flats = self._image(ole, self.flats, "<f4")[None, start:stop].astype(np.float32)
+                flats = self._image(ole, *self.flats)[None, start:stop].astype(np.float32)
         return ScanRows(found, flats, None)
 
     def look(self, part: Part, frames: Sequence[int], rows: Sequence[int]) -> Frames:
@@ -74,7 +82,7 @@ class TxrmRows:
         with _opened(self.path) as ole:
             if part == "flats":
                 assert self.flats is not None
-                image = self._image(ole, self.flats, "<f4")
+                image = self._image(ole, *self.flats)
                 return np.stack([image[list(rows)] for _ in frames]).astype(np.float32)
             images = [self._image(ole, image_name(view))[list(rows)] for view in frames]
         return np.stack(images).astype(np.float32)
@@ -100,7 +108,7 @@ def open_txrm_scan(path: Path, request: ScanRequest, *, budget: int | None) -> S
             raise InputError(f"{path}: {name} is given, and a TXRM file has nothing to name")
     with _opened(path) as ole:
         header = _Header(path, ole)
-        views = header.whole("NoOfImages", _MOST)
+        views, told = _views(header)
         shape = (views, header.whole("ImageHeight", _WIDEST), header.whole("ImageWidth", _WIDEST))
         dtype = header.dtype()
         missing = next((k for k in range(views) if not ole.exists(image_name(k))), None)
@@ -108,12 +116,10 @@ def open_txrm_scan(path: Path, request: ScanRequest, *, budget: int | None) -> S
             raise FileFormatError(
                 f"{path}: names {views} images, and number {missing + 1} is missing"
             )
-        reference = next((name for name in _REFERENCES if ole.exists(name)), None)
-        size = 4 * shape[1] * shape[2]
-        if reference is not None and ole.get_size(reference) != size:
-            reference = None
+        reference, unused = _reference(header, shape[1] * shape[2])
         angles = AngleList("ImageInfo/Angles", header.numbers("Angles", views), unit="degrees")
         cone, pixel = _beam(header, views)
+        silent = _silent_distances(header) if request.geometry is None else ()
         shifts = header.shifts(views)
     if cone is not None:
         # The sense that CIL reads; ours is the opposite.
@@ -145,9 +151,51 @@ def open_txrm_scan(path: Path, request: ScanRequest, *, budget: int | None) -> S
         pitch=pixel,
         unit="" if pixel is None else "um",
         beam=beam,
-        notes=(*doubts, *_unapplied(shifts)),
+        notes=(*told, *doubts, *silent, *_unapplied(shifts)),
+        contents=lambda: unused,
     )
     return scan_of(found, request)
+
+
+def _views(header: _Header) -> tuple[int, tuple[str, ...]]:
+    """The number of images that there are, and a sentence where there were to be more."""
+    wanted = header.whole("NoOfImages", _MOST)
+    taken = header.number("ImagesTaken")
+    if not 1 <= taken < wanted:
+        return wanted, ()
+    return int(taken), (
+        f"The scan ended early: {taken:g} of {wanted} images were taken, which are read.",
+    )
+
+
+def _reference(header: _Header, pixels: int) -> tuple[Reference | None, str]:
+    """The image of the beam, or a phrase about why there is one that cannot be read."""
+    name = next((name for name in _REFERENCES if header.ole.exists(name)), None)
+    if name is None:
+        return None, ""
+    size = header.ole.get_size(name)
+    code = header.number(f"{name.partition('/')[0]}/DataType", within="")
+    # Files that do not say so keep real numbers, if not what their images are.
+    types = ("<f4", header.dtype()) if np.isnan(code) else (_TYPES.get(int(code)),)
+    for dtype in types:
+        if dtype is not None and size == pixels * np.dtype(dtype).itemsize:
+            return Reference(name, dtype), ""
+    of = "" if np.isnan(code) else f" of type {code:g}"
+    return None, f"its {name} holds {size} bytes{of}, which is no image of {pixels} pixels"
+
+
+def _silent_distances(header: _Header) -> tuple[str, ...]:
+    """A doubt about parallel rays where distances are told, and not what the rays are."""
+    if not np.isnan(header.number("XrayGeometry")):
+        return ()
+    lengths = [header.first(name) for name in ("StoRADistance", "DtoRADistance")]
+    if not all(length > 0 for length in lengths) or 1 + lengths[1] / lengths[0] < PARALLEL_BELOW:
+        return ()
+    return (
+        "The file does not say what its rays are (XrayGeometry), and they are taken as parallel. "
+        f"It has the source {lengths[0]:.4g} mm and the detector {lengths[1]:.4g} mm from the "
+        "axis: if they are a cone's, write these in a file of your own (--geometry).",
+    )
 
 
 def _unapplied(shifts: tuple[float, float]) -> tuple[str, ...]:
@@ -167,8 +215,9 @@ def _beam(header: _Header, views: int) -> tuple[Beam | None, float | None]:
     pixel = usable_pitch(header.number("PixelSize"))
     if header.number("XrayGeometry") != _CONE or pixel is None:
         return None, pixel
-    to_axis = float(np.abs(header.numbers("StoRADistance", views))[0])
-    beyond = float(np.abs(header.numbers("DtoRADistance", views))[0])
+    to_axis, beyond = (
+        float(np.abs(header.numbers(name, views))[0]) for name in ("StoRADistance", "DtoRADistance")
+    )
     pitch = pixel / 1000 * (to_axis + beyond) / max(to_axis, 1e-30)
     return Beam(
         source_to_axis=to_axis,
@@ -185,7 +234,7 @@ def _beam(header: _Header, views: int) -> tuple[Beam | None, float | None]:
 
 @dataclass(frozen=True)
 class _Header:
-    """Small streams of ``ImageInfo``."""
+    """Small streams, most of them of ``ImageInfo``."""
 
     path: Path
     ole: olefile.OleFileIO
@@ -195,11 +244,17 @@ class _Header:
         data = _stream(self.path, self.ole, f"ImageInfo/{name}", 4 * count)
         return np.frombuffer(data, "<f4").astype(np.float64)
 
-    def number(self, name: str) -> float:
-        """A whole number or a real one, by its name; NaN where there is none."""
+    def first(self, name: str) -> float:
+        """The first of real numbers, without its sign; NaN where there are none."""
         if not self.ole.exists(f"ImageInfo/{name}"):
             return float("nan")
-        data = _stream(self.path, self.ole, f"ImageInfo/{name}", 4)
+        return abs(float(self.numbers(name, 1)[0]))
+
+    def number(self, name: str, *, within: str = "ImageInfo/") -> float:
+        """A whole number or a real one, by its name; NaN where there is none."""
+        if not self.ole.exists(f"{within}{name}"):
+            return float("nan")
+        data = _stream(self.path, self.ole, f"{within}{name}", 4)
         return float(np.frombuffer(data, "<f4" if name == "PixelSize" else "<i4")[0])
 
     def whole(self, name: str, most: int) -> int:
