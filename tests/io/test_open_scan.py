@@ -125,6 +125,8 @@ def test_nxtomo(tmp_path: Path, group: str) -> None:
     np.testing.assert_array_equal(rows.projections, data[made.KEYS == 0, 1:4])
     np.testing.assert_array_equal(rows.flats, data[made.KEYS == 1, 1:4])
     np.testing.assert_array_equal(rows.darks, data[made.KEYS == 2, 1:4])
+    (tmp_path / "a.nxs").rename(tmp_path / "a.nx")
+    assert open_scan(tmp_path / "a.nx").source == scan.source
 
 
 def sized(path: Path, name: str, value: float, unit: str = "um") -> None:

@@ -115,7 +115,7 @@ def test_names_that_lie(tmp_path: Path) -> None:
     with pytest.raises(FileFormatError, match=r"NPZ.*HDF5"):
         open_scan(tmp_path / "really_hdf5.npz")
     made.data_exchange(tmp_path / "a.dat")
-    with pytest.raises(InputError, match=r"not from '\.dat'"):
+    with pytest.raises(InputError, match=r"not from '\.dat'.*\.yaml.*register_scan_reader"):
         open_scan(tmp_path / "a.dat")
     with pytest.raises(InputError, match=r"gone\.h5"):
         open_scan(tmp_path / "gone.h5")

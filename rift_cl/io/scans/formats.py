@@ -124,7 +124,7 @@ def open_scan(
     and attributes, else from numbers and values. ``ScanFile.notes[0]`` says what was found in one
     line; what remains doubtful is refused with the option that settles it.
 
-    HDF5 (.h5, .hdf5, .hdf, .nxs) may hold a Data Exchange scan, an NXtomo scan, or arrays that
+    HDF5 (.h5, .hdf5, .hdf, .nxs, .nx) may hold a Data Exchange scan, an NXtomo scan, or arrays that
     are named here. NPZ holds ``projections`` (angle, row, bin) or ``sinogram`` (angle, bin) and
     ``angles`` in radians, and may hold ``flats``, ``darks``, ``pitch`` (one number, or those of
     rows and of bins) and ``unit``, the text that names the unit of lengths. NPY holds the
@@ -219,7 +219,9 @@ def _opened(path: Path, request: ScanRequest, budget: int | None) -> ScanFile:
         known = ", ".join(sorted({*_READERS, *SCAN_READERS, *DESCRIPTIONS}))
         raise InputError(
             f"{path}: a scan is read from a folder of TIFF files, or from {known}, not from "
-            f"{suffix!r}"
+            f"{suffix!r}: describe projections of one of these kinds in a few lines of .yaml "
+            "(docs/how-to/scan_cones.md), or read others by a function of yours "
+            "(register_scan_reader, in a file that --load names)"
         )
     with reading(path, "the file"):
         if suffix in SCAN_READERS:

@@ -16,7 +16,7 @@ from rift_cl.errors import FileFormatError, InputError
 from rift_cl.io.hdf5_tree import Hdf5Tree, open_tree
 from rift_cl.io.scans.frame_words import is_said, says_angles
 
-HDF5_SUFFIXES = (".h5", ".hdf5", ".hdf", ".nxs")
+HDF5_SUFFIXES = (".h5", ".hdf5", ".hdf", ".nxs", ".nx")
 _PLACE = re.compile(rf"(.+(?:{'|'.join(map(re.escape, HDF5_SUFFIXES))}))(?::(.+))?", re.IGNORECASE)
 # Datasets among which the one that is meant is looked for.
 _MOST_NAMED = 1000
