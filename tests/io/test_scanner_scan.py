@@ -345,6 +345,19 @@ def test_the_walnut(shared_data: Path) -> None:
     assert cone.magnification == pytest.approx(2.6286, abs=1e-4)
 
 
+@pytest.mark.parametrize("text", [".15", "+.15", "0.15", "15.e-2", "[.15, +0.15]", "[1.5e-1, .15]"])
+def test_numbers_as_yaml_has_them(tmp_path: Path, text: str) -> None:
+    path = tmp_path / "geometry.yaml"
+    path.write_text(f"source_to_axis: +50.\nsource_to_detector: 200\npitch: {text}\n")
+    beam = read_beam(path)
+    assert isinstance(beam, Beam)
+    assert beam.pitch == pytest.approx((0.15, 0.15)) and beam.source_to_axis == 50
+    for wrong in (".", "+", "+.e1", "1_0"):
+        path.write_text(f"source_to_axis: 50\nsource_to_detector: 200\npitch: {wrong}\n")
+        with pytest.raises(InputError, match="pitch"):
+            read_beam(path)
+
+
 @pytest.mark.parametrize(
     ("lengths", "found"),
     [

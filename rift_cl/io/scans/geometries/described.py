@@ -17,6 +17,7 @@ that are not known are refused, so that none is passed over for a slip.
 from __future__ import annotations
 
 import math
+import re
 import reprlib
 from collections.abc import Mapping
 from dataclasses import replace
@@ -43,6 +44,8 @@ _NAMES = (
     *("projections", "unit", "pitch", "center", "angles", "angle_unit", "heights", "curved"),
     *("lean", "white", "geometry", "magnification"),
 )
+# Numbers of YAML 1.2's core schema that JSON knows not; names of folders such as 007 are none.
+_YAML_NUMBER = re.compile(r"[-+]?(?:\.\d+|(?:0|[1-9]\d*)(?:\.\d*)?)(?:[eE][-+]?\d+)?", re.ASCII)
 
 
 def read_described(path: Path) -> AnyBeam:
@@ -153,7 +156,8 @@ def _fields(path: Path) -> dict[str, Any]:
 def _read(text: str) -> Any:
     """The values of YAML or JSON, whose scalars mean what they mean in JSON, and else are text.
 
-    YAML's own rules would make seconds of ``10:50``, and no number of ``1e3``.
+    YAML 1.1's own rules would make seconds of ``10:50``, and no number of ``1e3``. Numbers that
+    YAML 1.2 has and JSON has not (``.15``, ``+2``, ``5.``) are read as well.
 
     Raises:
         ValueError: it is neither.
@@ -186,7 +190,7 @@ def _meant(value: Any) -> Any:
     try:
         return parse_json(value) if value else None
     except ValueError:
-        return value
+        return float(value) if _YAML_NUMBER.fullmatch(value) else value
 
 
 def _number(path: Path, fields: Mapping[str, Any], name: str) -> float | None:
