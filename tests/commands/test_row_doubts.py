@@ -53,6 +53,12 @@ def _dark_views(lines):
     return made
 
 
+def _zero_views(lines):
+    made = frames(lines)
+    made["data"][[20, 21, 77]] = 0
+    return made
+
+
 def _open_views(lines):
     made = frames(lines)
     made["data"][5::40] = np.random.default_rng(1).poisson(BEAM, (3, 2, BINS)) + DARK
@@ -86,6 +92,7 @@ WRONG = {
         _dark_views,
         "20 of 120 views have next to no beam .views 70, 71, 72, 73",
     ),
+    "frames of zeros": (_zero_views, "3 of 120 views have next to no beam .views 20, 21, 77"),
     "flats between": (_open_views, "3 of 120 views show next to nothing .* .views 5, 45, 85"),
     "starved": (lambda lines: frames(6 * lines, BEAM), "of row 1 have no signal above"),
     "dark flats": (_dark_flats, "the flats read .* above the darks: some of them"),

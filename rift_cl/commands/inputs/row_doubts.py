@@ -55,19 +55,30 @@ def row_doubts(scan: ScanFile, row: int, found: Attenuation) -> list[str]:
     if frames.flats is not None or scan.kind == "transmission" or scan.background:
         told = told or _bright(lines, row) or _weak_beam(scan, lines)
     two = _two_levels(scan, frames)
-    return _dark_views(lines) + _open_views(lines) + _starved(found, row) + two + told
+    silent = _silent(frames)
+    starved = _starved(found, row, silent)
+    return _dark_views(lines, silent) + _open_views(lines) + starved + two + told
 
 
-def _dark_views(lines: Floats) -> list[str]:
-    """Views in which no bin sees what it usually does."""
+def _silent(rows: ScanRows) -> NDArray[np.bool_]:
+    """(view,) whether no bin of a row is above the darks, as in frames of zeros."""
+    level = np.float32(0) if rows.darks is None else rows.darks.mean(axis=0)
+    silent: NDArray[np.bool_] = ~np.any(rows.projections > level, axis=(1, 2))
+    return silent
+
+
+def _dark_views(lines: Floats, silent: NDArray[np.bool_]) -> list[str]:
+    """Views in which no bin sees what it usually does, or anything."""
     brightest = np.percentile(lines, 5, axis=1)
-    dark = np.flatnonzero(brightest > np.median(brightest) - np.log(_NO_BEAM))
+    # The line integrals of silent views are filled from their neighbours'.
+    usual = np.median(brightest)
+    dark = np.flatnonzero((brightest > usual - np.log(_NO_BEAM)) | silent)
     if not 0 < len(dark) < len(lines) / 2:
         return []
     where = f"view {dark[0]}" if len(dark) == 1 else f"views {_listed(dark)}"
     return [
         f"Doubt: {len(dark)} of {len(lines)} views have next to no beam ({where}): the shutter was "
-        "shut, or they are darks; leave them out, with their angles."
+        "shut, frames were lost, or they are darks; leave them out, with their angles."
     ]
 
 
@@ -93,9 +104,11 @@ def _listed(numbers: NDArray[np.intp]) -> str:
     return shown if len(numbers) <= _LISTED else f"{shown}, ..."
 
 
-def _starved(found: Attenuation, row: int) -> list[str]:
+def _starved(found: Attenuation, row: int, silent: NDArray[np.bool_]) -> list[str]:
+    """Samples without a signal, but for those of views that are silent as a whole."""
     views, _, bins = found.projections.shape
-    share = found.starved / (views * bins)
+    whole = int(silent.sum()) * (bins - found.dead)
+    share = (found.starved - whole) / (views * bins)
     if share <= _STARVED:
         return []
     return [
