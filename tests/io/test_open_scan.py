@@ -129,6 +129,34 @@ def test_nxtomo(tmp_path: Path, group: str) -> None:
     assert open_scan(tmp_path / "a.nx").source == scan.source
 
 
+@pytest.mark.parametrize(
+    ("name", "value", "told"),
+    [
+        ("x_flipped", True, True),
+        ("y_flipped", np.array([1]), True),
+        ("x_flipped", False, False),
+        ("x_flipped", "yes", False),
+        ("transformations/ry", 180.0, True),
+        ("transformations/rx", np.pi, True),
+        ("transformations/rx", 0.0, False),
+        ("transformations/height", 180.0, False),
+    ],
+)
+def test_frames_that_nxtomo_calls_mirrored(
+    tmp_path: Path, name: str, value: Any, told: bool
+) -> None:
+    data = made.nxtomo(tmp_path / "a.nxs")
+    with h5py.File(tmp_path / "a.nxs", "a") as file:
+        detector = file["entry1/tomo_entry/instrument/detector"]
+        detector[name] = value
+        kind = "translation" if "height" in name else "rotation"
+        detector[name].attrs["transformation_type"] = kind
+        detector[name].attrs["units"] = "rad" if value is np.pi else "deg"
+    scan = open_scan(tmp_path / "a.nxs")
+    assert any(repr(name) in note and "--reversed" in note for note in scan.notes) == told
+    np.testing.assert_array_equal(whole(scan), data[made.KEYS == 0])
+
+
 def sized(path: Path, name: str, value: float, unit: str = "um") -> None:
     """Add a size of a pixel to an HDF5 file."""
     with h5py.File(path, "a") as file:

@@ -177,17 +177,18 @@ def read_angles(tree: Hdf5Tree, name: str) -> AngleList:
 
 def axes_stated(tree: Hdf5Tree, name: str) -> str | None:
     """The letters of the axes that a dataset's attribute ``axes`` states, or None."""
-    text = _attribute(tree, name, "axes")
+    text = text_attribute(tree, name, "axes")
     # Data Exchange calls the frame axis of the projections theta.
     return spelled(text) if text else None
 
 
 def unit_of(tree: Hdf5Tree, name: str) -> str:
     """The ``units`` attribute of a dataset, empty where it has none."""
-    return _attribute(tree, name, "units")
+    return text_attribute(tree, name, "units")
 
 
-def _attribute(tree: Hdf5Tree, name: str, key: str) -> str:
+def text_attribute(tree: Hdf5Tree, name: str, key: str) -> str:
+    """An attribute of a dataset that is a text, empty where it has none."""
     value = tree.dataset(name).attrs.get(key, "")
     return _decoded(value.item() if isinstance(value, np.ndarray) and value.size == 1 else value)
 
