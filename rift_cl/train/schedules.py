@@ -73,7 +73,6 @@ class LearningRateSchedule:
             "reflectance": fade * rates.reflectance,
             "normals": fade * rates.normals,
             "poses": self._pose_share(step) * self._pose_rate,
-            "exposures": fade * rates.exposures * falling,
         }
 
     @property

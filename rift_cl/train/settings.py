@@ -70,8 +70,6 @@ class LearningRates:
     """How far a camera can move in a run if poses are refined, about each axis in radians, along
     each as a fraction of the scene's extent; less in runs of few steps for each view. The learning
     rate follows from it."""
-    exposures: float = 1e-2
-    """Learning rate of each image's gains and offsets, if they are refined; it falls likewise."""
     shape_modes: float = 2.5e-3
     """Learning rate of the Hermite modes of splats' shapes."""
     # At 1e-2 both serve short fits better, but fits of order 2 were lost after some 1,500 steps.

@@ -56,8 +56,8 @@ _GROUPS = {
 # What there is where splats share a light, beside that.
 _LIT = ("normals", "reflectance")
 _PER_VIEW: Mapping[str, Mapping[str, tuple[int, ...]]] = {
-    "poses": {"views": (4, 4), "first": (6,), "second": (6,)},
-    "exposures": {"values": (2, 3), "first": (2, 3), "second": (2, 3)},
+    "poses": {"counts": (), "views": (4, 4), "first": (6,), "second": (6,)},
+    "exposures": {"values": (2, 3)},
 }
 # Infinity until the first square of a residual is known.
 _LOSS = Field((), "f8", 0, finite=False)
@@ -106,9 +106,8 @@ def _schema(state: Arrays, views: int) -> dict[str, Field]:
         fields["sheet.normals"] = _trained(("splats", 3), -np.inf)
     for name, shapes in _PER_VIEW.items():
         if any(key.startswith(f"{name}.") for key in state):
-            fields[f"{name}.counts"] = Field((views,), "f8", 0)
             for key, shape in shapes.items():
-                least = 0 if key == "second" else -np.inf
+                least = 0 if key in ("second", "counts") else -np.inf
                 fields[f"{name}.{key}"] = Field((views, *shape), "f8", least)
     if any(key.startswith("octaves.") for key in state):
         fields |= _OCTAVES

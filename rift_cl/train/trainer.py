@@ -238,7 +238,7 @@ class Trainer:
             camera if self.octaves is None else self.octaves.camera(camera),
             background=self.pictures.background(number),
         )
-        value, by_image = self._compared(frame, number, rates["exposures"])
+        value, by_image = self._compared(frame, number)
         shares = settings.learning_rates
         sh_rest = shares.lobes_rest if "lobes" in parameters.raw else shares.sh_rest
         kept = self.strategy.wants_sh_gradient
@@ -401,7 +401,7 @@ class Trainer:
             return None
         return Environment.restored(self.device, groups["environment"])
 
-    def _compared(self, frame: Frame, number: int, rate: float) -> tuple[DeviceArray, DeviceArray]:
+    def _compared(self, frame: Frame, number: int) -> tuple[DeviceArray, DeviceArray]:
         """The loss of a rendered image and its gradient."""
         pictures, exposures, image = self.pictures, self.exposures, frame.image
         target, weights = pictures.target(number), pictures.weights(number)
@@ -418,7 +418,9 @@ class Trainer:
             self.octaves.after_step(self.parameters.step + 1, exposed, target, weights)
         if exposures is None:
             return value, by_exposed
-        return value, exposures.pulled_back(image, by_exposed, number, rate)
+        by_image = exposures.gradient(by_exposed, number)
+        exposures.fit(image, target, weights, number)
+        return value, by_image
 
     def _add_coefficients(self) -> None:
         """Add coefficients scheduled for this step; rebuild the renderer if needed."""

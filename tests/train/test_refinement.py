@@ -93,22 +93,67 @@ def test_a_gain_and_an_offset_for_each_colour_are_applied(device):
     np.testing.assert_array_equal(device.get(exposures.applied(sent, 0)), image.astype(np.float32))
 
 
-def test_exposures_that_differ_are_found_up_to_what_all_share(device):
+@pytest.mark.parametrize("weighted", [False, True])
+def test_exposures_that_differ_are_found_up_to_what_all_share(device, weighted):
     random, exposures = np.random.default_rng(4), Exposures(device, 2)
-    image = random.uniform(size=(16, 16, 3)).astype(np.float32)
+    image = random.uniform(size=(16, 15, 3)).astype(np.float32)
     gains = np.array([[1.2, 1.0, 0.9], [0.8, 1.0, 1.1]])
     targets = [(image * gain).astype(np.float32) for gain in gains]
+    weights = None
+    if weighted:
+        counted = random.uniform(size=(16, 15)) < 0.5
+        weights = device.array(counted.astype(np.float32))
+        targets = [np.where(counted[..., None], target, np.float32(9)) for target in targets]
     sent = device.array(image)
-    for step in range(1200):
+    for step in range(60):
         number = step % 2
-        exposed = device.get(exposures.applied(sent, number))
-        by_exposed = (2 * (exposed - targets[number]) / image.size).astype(np.float32)
-        by_image = exposures.pulled_back(sent, device.array(by_exposed), number, 0.01)
-        # Gains have moved by now; the gradient went through those that were applied.
-        assert device.get(by_image).shape == image.shape
-    np.testing.assert_allclose(exposures.values[:, 0], gains, atol=0.01)
-    np.testing.assert_allclose(exposures.values[:, 1], 0, atol=0.01)
+        exposures.fit(sent, device.array(targets[number]), weights, number)
+    np.testing.assert_allclose(exposures.values[:, 0], gains, atol=1e-4)
+    np.testing.assert_allclose(exposures.values[:, 1], 0, atol=1e-4)
     np.testing.assert_allclose(exposures.values.mean(axis=0), [[1] * 3, [0] * 3], atol=1e-12)
+
+
+def test_an_exposure_moves_to_the_least_of_a_known_sum(device):
+    random, exposures = np.random.default_rng(6), Exposures(device, 200)
+    image, noise = random.uniform(size=(2, 9, 11, 3)).astype(np.float32)
+    target = (image * [0.8, 0.4, 1.2] + 0.2 * noise).astype(np.float32)
+    weights = random.uniform(size=(9, 11)).astype(np.float32)
+    exposures.fit(*map(device.array, (image, target, weights)), 0)
+    roots, pixels = np.sqrt(weights.ravel().astype(float)), image.reshape(-1, 3)
+    for color in range(3):
+        rows = np.stack([roots * pixels[:, color], roots], axis=1)
+        cost = [0.0, np.sqrt(0.02 * weights.sum(dtype=float))]
+        wanted = [*(roots * target.reshape(-1, 3)[:, color]), 0.0]
+        best = np.linalg.lstsq(np.vstack([rows, cost]), wanted, rcond=None)[0]
+        # A share of .3 of the way from (1, 0), and a mean that is taken off all views.
+        gain, offset = 1 + 0.3 * (best[0] - 1), 0.3 * best[1]
+        assert exposures.values[0, 0, color] == pytest.approx(gain * 200 / (199 + gain), abs=1e-5)
+        assert exposures.values[0, 1, color] == pytest.approx(offset * 199 / 200, abs=1e-5)
+
+
+@pytest.mark.parametrize(
+    ("image", "target", "gain"),
+    [(0.0, 0.4, 1.0), (0.5, 0.0, 0.1), (0.01, 0.9, 10.0), (0.5, np.nan, 1.0)],
+    ids=["black", "of black", "of white", "no number"],
+)
+def test_pictures_that_tell_no_exposure(device, image, target, gain):
+    exposures = Exposures(device, 1)
+    sent = [device.array(np.full((4, 4, 3), value, np.float32)) for value in (image, target)]
+    exposures.fit(*sent, None, 0)
+    np.testing.assert_allclose(exposures.values, [[[1] * 3, [0] * 3]], atol=1e-12)
+    pair = Exposures(device, 2)
+    pair.fit(*sent, None, 0)
+    moved = 1 + 0.3 * (gain - 1)
+    np.testing.assert_allclose(pair.values[0, 0] / pair.values[1, 0], moved, rtol=1e-6)
+    pair.fit(*sent, device.zeros((4, 4)), 1)
+    assert np.isfinite(pair.values).all()
+
+
+def test_the_gradient_by_an_image_is_that_by_its_exposure_times_the_gain(device):
+    exposures, by = Exposures(device, 2), np.random.default_rng(1).normal(size=(5, 6, 3))
+    exposures.values[1] = [[1.1, 0.9, 1.0], [0.1, 0.0, -0.2]]
+    found = device.get(exposures.gradient(device.array(by.astype(np.float32)), 1))
+    np.testing.assert_allclose(found, by * [1.1, 0.9, 1.0], atol=1e-6)
 
 
 @pytest.mark.parametrize("kind", ["poses", "exposures"])
@@ -120,7 +165,7 @@ def test_a_state_brings_both_back(device, kind):
         if kind == "poses":
             one.update(1, np.arange(12.0).reshape(3, 4), 0.01)
         else:
-            one.pulled_back(image, image, 1, 0.01)
+            one.fit(image, device.array(np.full((4, 4, 3), 0.5, np.float32)), None, 1)
 
     step(made[0])
     made[1].restore(made[0].state())

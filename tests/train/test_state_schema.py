@@ -76,7 +76,7 @@ def test_a_state_is_one_of_its_run(trainer):
 def test_no_array_of_another_kind_is_taken(trainer, change):
     state = trainer.state()
     arrays = [name for name in state if state[name].ndim and not name.startswith("strategy.")]
-    assert {"raw.means", "second.sh", "poses.views", "exposures.counts"} <= set(arrays)
+    assert {"raw.means", "second.sh", "poses.views", "exposures.values"} <= set(arrays)
     for name in arrays:
         refused(trainer, {**state, name: change(state[name])}, name.partition(".")[2])
 
@@ -106,7 +106,7 @@ def test_all_arrays_of_a_group_must_agree(trainer):
     refused(trainer, {**state, "raw.sh": wide}, "first.sh")
 
 
-@pytest.mark.parametrize("name", ["second.means", "poses.second", "exposures.counts", "step"])
+@pytest.mark.parametrize("name", ["second.means", "poses.second", "poses.counts", "step"])
 def test_what_cannot_be_negative_is_not(trainer, name):
     state = trainer.state()
     refused(trainer, {**state, name: negative(state[name])}, name)

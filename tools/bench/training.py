@@ -58,7 +58,8 @@ def training_operations(case: SplatCase) -> dict[str, Callable[[], Any]]:
 
     def expose() -> None:
         exposed = exposures.applied(case.frame.image, 0)
-        exposures.pulled_back(case.frame.image, exposed, 0, 0.0)
+        exposures.gradient(exposed, 0)
+        exposures.fit(case.frame.image, target, None, 0)
 
     return {
         "loss": lambda: loss(device, case.frame.image, target),
@@ -136,7 +137,8 @@ TRAINING_COSTS: dict[str, Cost] = {
     "keep_norm": _per("sample", _samples, 8, "in and out", 1),
     "axpby": _per("sample", _samples, 12, "two in, one out", 3),
     "expose": _per("sample", _samples, 8, "in and out", 2),
-    "expose_grad": _per("sample", _samples, 20, "image and gradient in, gradient and parts out", 2),
+    "expose_grad": _per("sample", _samples, 8, "in and out", 1),
+    "expose_moments": _per("sample", _samples, 25, "image and photograph in, parts out", 2),
     "ssim_map": _per("sample", _samples, 20, "two images in, three maps out", 215),
     "loss_grad": _per("sample", _samples, 24, "two images and three maps in, gradient out", 145),
 }

@@ -36,7 +36,7 @@ _STAGES = {
     "project and shade": ("splat_project", "splat_shade", "light_lobes", "light_shade"),
     "tile lists": ("tile_", "radix_", "scan_"),
     "raster": ("splat_pack", "splat_raster_cpu", "splat_raster_gpu"),
-    "exposure": ("expose", "expose_grad"),
+    "exposure": ("expose", "expose_grad", "expose_moments"),
     "loss": ("ssim_map", "loss_grad", "sum_columns"),
     "homogenisation": ("fft_", "keep_norm", "axpby"),
     "raster gradient": (
@@ -54,7 +54,7 @@ DECODING, UPLOAD = "decoding of the picture", "upload"
 # Share of the splats that have faded when the price of a relocation is taken.
 _FADED, _FADED_LOGIT = 0.05, -7.0
 # Fits of more than splats, whose waits are looked at as well.
-_REFINED = LearningRates(pose_reach=1e-3, exposures=1e-3)
+_REFINED = LearningRates(pose_reach=1e-3)
 
 
 def stage_of(kernel: str) -> str:

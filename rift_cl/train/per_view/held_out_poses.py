@@ -81,4 +81,4 @@ def _compared(
     counted = None if weights is None else device.get(weights) > 0
     exposures.values[0] = fitted_exposure(device.get(image), device.get(target), counted)
     value, by_exposed = loss(device, exposures.applied(image, 0), target, weights=weights)
-    return float(device.get(value)[0]), exposures.gradient(image, by_exposed, 0)
+    return float(device.get(value)[0]), exposures.gradient(by_exposed, 0)
