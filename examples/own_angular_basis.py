@@ -1,7 +1,8 @@
 """An angular basis of your own: powers of the cosine between the viewing direction and an axis.
 
 Each splat has an axis, which is trained (three numbers of geometry), and coefficients of 1, t, t^2
-and so on, with t the cosine. A basis gives its functions and their derivatives in NumPy.
+and so on, with t the cosine. A basis gives its functions and their derivatives in NumPy. Run it, or
+give it to ``rift --load``.
 """
 
 import numpy as np
@@ -37,20 +38,27 @@ class CosinePowers(AngularFunctions):
 
 register_angular_basis("cosine", CosinePowers)
 
-device = rift.default_device()
-random = np.random.default_rng(0)
-splats = rift.Splats.upload(
-    device,
-    means=random.uniform(-1, 1, (50, 3)),
-    quats=random.normal(size=(50, 4)),
-    scales=np.full((50, 3), 0.1),
-    opacities=np.full(50, 0.8),
-    sh=random.normal(size=(50, 4, 3)),
-    lobes=random.normal(size=(50, 3)),
-)
-view = np.eye(4)
-view[2, 3] = 4
-camera = rift.Camera((32, 32), [[32, 0, 16], [0, 32, 16], [0, 0, 1]], view)
-renderer = rift.Renderer(rift.SplatSettings(angular="cosine"), device=device)
-frame = renderer.forward(splats, camera)
-print(f"mean of the image: {device.get(frame.image).mean():.4f}")
+
+def main():
+    """Render splats whose colours are in this basis."""
+    device = rift.default_device()
+    random = np.random.default_rng(0)
+    splats = rift.Splats.upload(
+        device,
+        means=random.uniform(-1, 1, (50, 3)),
+        quats=random.normal(size=(50, 4)),
+        scales=np.full((50, 3), 0.1),
+        opacities=np.full(50, 0.8),
+        sh=random.normal(size=(50, 4, 3)),
+        lobes=random.normal(size=(50, 3)),
+    )
+    view = np.eye(4)
+    view[2, 3] = 4
+    camera = rift.Camera((32, 32), [[32, 0, 16], [0, 32, 16], [0, 0, 1]], view)
+    renderer = rift.Renderer(rift.SplatSettings(angular="cosine"), device=device)
+    frame = renderer.forward(splats, camera)
+    print(f"mean of the image: {device.get(frame.image).mean():.4f}")
+
+
+if __name__ == "__main__":
+    main()

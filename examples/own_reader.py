@@ -2,7 +2,8 @@
 
 ``rift.register_scan_reader`` takes an extension and a function from a path to a scan, and from then
 on ``rift.open_scan``, ``rift.reconstruct_scan``, ``rift.fit`` and the command line in this process
-read such files. A memory map keeps a scan on the disk until its rows are wanted.
+read such files. A memory map keeps a scan on the disk until its rows are wanted. Run it, or give it
+to ``rift --load``.
 """
 
 import json
@@ -24,15 +25,22 @@ def open_raw(path, request):
 
 rift.register_scan_reader(".raw", open_raw)
 
-with tempfile.TemporaryDirectory() as folder:
-    grid, degrees = rift.Grid((4, 64, 64), spacing=0.5), np.arange(0, 180, 2.0)
-    scan = rift.Parallel(np.radians(degrees), bins=96, pitch=0.5)
-    sinograms = rift.phantom.shepp_logan_sinogram(grid, scan).astype(np.float32)
-    sinograms.tofile(Path(folder, "scan.raw"))
-    header = {"shape": sinograms.shape, "degrees": degrees.tolist(), "pitch_mm": 0.5}
-    Path(folder, "scan.json").write_text(json.dumps(header))
 
-    made = rift.reconstruct_scan(Path(folder, "scan.raw"), filter="hann")
-    print(made)
-    print("\n".join(made.notes))
-    print(f"{made.read().shape} voxels, the axis at bin {made.settings.center:.2f}")
+def main():
+    """Write such a scan and reconstruct it."""
+    with tempfile.TemporaryDirectory() as folder:
+        grid, degrees = rift.Grid((4, 64, 64), spacing=0.5), np.arange(0, 180, 2.0)
+        scan = rift.Parallel(np.radians(degrees), bins=96, pitch=0.5)
+        sinograms = rift.phantom.shepp_logan_sinogram(grid, scan).astype(np.float32)
+        sinograms.tofile(Path(folder, "scan.raw"))
+        header = {"shape": sinograms.shape, "degrees": degrees.tolist(), "pitch_mm": 0.5}
+        Path(folder, "scan.json").write_text(json.dumps(header))
+
+        made = rift.reconstruct_scan(Path(folder, "scan.raw"), filter="hann")
+        print(made)
+        print("\n".join(made.notes))
+        print(f"{made.read().shape} voxels, the axis at bin {made.settings.center:.2f}")
+
+
+if __name__ == "__main__":
+    main()

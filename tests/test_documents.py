@@ -1,5 +1,6 @@
 """What README and docs promise: code and tutorials run; commands, options and links are there."""
 
+import ast
 import importlib
 import json
 import re
@@ -89,6 +90,11 @@ def test_a_tutorial_runs_from_top_to_bottom(name, run_page, tmp_path):
         ):
             if added in registry:
                 registry.remove(added)
+    if name == "own_parts":
+        kernels = re.findall(
+            r"`((?:radon|plane)\w+)`", (DOCS / "tutorials/own_parts.md").read_text()
+        )
+        assert {"radon_project", *kernels} <= set(names["fresh"].kernels)
     if name == "operators":
         errors = [psnr(image, names["truth"], peak=1.0) for image in names["slices"].values()]
         assert min(errors) > 20
@@ -96,6 +102,31 @@ def test_a_tutorial_runs_from_top_to_bottom(name, run_page, tmp_path):
         assert (tmp_path / "again/report.html").exists()
     if name == "photographs":
         assert (tmp_path / "scene.ply").exists() and names["film"].read(0).shape[2] == 3
+
+
+def registering():
+    """What ``rift --load`` may be given: blocks of the page of own parts, and whole examples."""
+    page = (DOCS / "tutorials/own_parts.md").read_text()
+    blocks = re.findall(r"^```python\n(.*?)^```$", page, re.MULTILINE | re.DOTALL)
+    found = {f"block {n}": text for n, text in enumerate(blocks) if "register_" in text}
+    assert len(found) == 3
+    for path in sorted((ROOT / "examples").glob("own_*.py")):
+        if "rift.register_" in path.read_text() or " register_" in path.read_text():
+            found[path.name] = path.read_text()
+    return found
+
+
+@pytest.mark.parametrize("text", registering().values(), ids=registering())
+def test_what_registers_a_part_does_nothing_else(text):
+    """So that a file of it, loaded before each command, costs nothing."""
+    for line in ast.parse(text).body:
+        if isinstance(line, ast.Expr) and isinstance(line.value, ast.Call):
+            assert "register_" in ast.unparse(line.value.func)
+        elif isinstance(line, ast.If):
+            assert ast.unparse(line.test) == "__name__ == '__main__'"
+        else:
+            plain = (ast.Import, ast.ImportFrom, ast.FunctionDef, ast.ClassDef)
+            assert isinstance(line, plain) or isinstance(getattr(line, "value", None), ast.Constant)
 
 
 def test_python_on_a_page_of_prose_runs(run_page, tmp_path):

@@ -15,7 +15,7 @@ ROOT = Path(__file__).parents[1]
 EXAMPLES = sorted((ROOT / "examples").glob("*.py"))
 # The size that an example is given, and a text that it prints.
 RUNS = {
-    "find_axis": ("64", "found at bin 35."),
+    "find_axis": ("64", "found at bin 35.4"),
     "fit_photographs": ("20", "<RenderedScene in "),
     "fit_xray": ("20", "<XrayScene: 1000 splats"),
     "own_angular_basis": ("", "mean of the image: "),

@@ -13,6 +13,7 @@ from __future__ import annotations
 import argparse
 import time
 from collections.abc import Callable
+from importlib.util import find_spec
 from typing import Any
 
 import numpy as np
@@ -29,6 +30,8 @@ def main() -> None:
         "--runs", type=int, default=7, help="runs of each, of which the best counts"
     )
     given = parser.parse_args()
+    if find_spec("astra") is None:
+        parser.error("ASTRA, the peer, is not installed: pip install astra-toolbox")
     grid, scan = rift.Grid((given.size, given.size)), turn(given.size, given.views)
     head = rift.phantom.shepp_logan(grid)
     truth = rift.phantom.shepp_logan_sinogram(grid, scan)

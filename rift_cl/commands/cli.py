@@ -23,6 +23,7 @@ import tyro
 
 from rift_cl import __version__
 from rift_cl.commands.console_table import print_table
+from rift_cl.commands.interrupts import gentle_interrupt
 from rift_cl.commands.options import gathered
 from rift_cl.commands.progress_bar import print_any_text, print_line
 from rift_cl.commands.runner import (
@@ -30,7 +31,6 @@ from rift_cl.commands.runner import (
     Terminated,
     command,
     exit_status,
-    gentle_interrupt,
     ran,
     run_job,
     told,

@@ -1,11 +1,15 @@
 """The commands as functions: ``rift.fit``, ``rift.render``, ``rift.plan_views`` and so on.
 
 Each takes what its command takes, by the same names with underscores, checked by the same parser;
-runs the same job; and gives back a record of what came out. Nothing is printed: ``progress`` is
-called with each ``Report``, and ``progress=True`` shows the commands' bar, in a notebook below the
-cell. ``config="run/config.json"`` repeats an earlier run, whose settings other arguments override.
-Without ``out`` the files go to a temporary folder, which is removed with the record that is given
-back.
+runs the same job; and gives back a record of what came out. ``config="run/config.json"`` repeats an
+earlier run, whose settings other arguments override. Without ``out`` the files go to a temporary
+folder, which is removed with the record that is given back.
+
+Nothing is printed: ``progress`` is called with each ``Report``, and ``progress=True`` shows the
+commands' bar, in a notebook below the cell. A run is broken off where ``progress`` returns False.
+Then, and where an interrupt breaks off what a command keeps at Ctrl-C, ``StoppedError`` says what
+is kept in ``out`` and how to go on; a fit keeps a checkpoint of the step that it was at. An error
+that ``progress`` raises ends a run at once.
 """
 
 from __future__ import annotations
@@ -15,12 +19,13 @@ import shutil
 import tempfile
 import weakref
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from pathlib import Path
 from typing import Any, Literal, TypeVar
 
 import numpy as np
 
+from rift_cl.commands.interrupts import gentle_interrupt, plain_interrupt
 from rift_cl.commands.progress_bar import show_progress
 from rift_cl.commands.results import (
     AnalyzedViews,
@@ -39,11 +44,11 @@ from rift_cl.commands.run_folder.saved_settings import (
     parsed_settings,
     saved_settings,
 )
-from rift_cl.errors import InputError
+from rift_cl.errors import InputError, StoppedError
 from rift_cl.progress import Report
 
 PathLike = str | os.PathLike[str]
-Progress = Callable[[Report], None] | bool | None
+Progress = Callable[[Report], object] | bool | None
 S = TypeVar("S")
 # Options that have a meaning on a command line alone.
 _COMMAND_LINE = ("dry_run", "preview")
@@ -62,11 +67,12 @@ def reconstruct_scan(
         scan: the scan's file or folder; see ``open_scan``.
         out: folder for the slices, preview.png, report.html, config.json and metrics.json; a
             temporary one when not given.
-        progress: is called with a report after every slab or step.
+        progress: is called with a report after every slab or step; breaks off by returning False.
         **settings: the command's options by their names in Python, such as ``center=295.9`` or
             ``method="tv"``; see ``ReconstructSettings``.
 
     Raises:
+        StoppedError: it was broken off by ``progress`` or by an interrupt.
         RiftError: a setting, the scan, the device or the folder cannot be used.
     """
     from rift_cl.commands.reconstruct.choice import reconstruction_of
@@ -101,11 +107,13 @@ def fit(
             checkpoints; a temporary one when not given.
         kind: which of the two; an X-ray scan where ``capture`` is a scan file or describes one,
             else photographs, when not given.
-        progress: is called with a report now and then.
+        progress: is called with a report now and then; breaks off by returning False, with a
+            checkpoint from which ``resume=True`` goes on.
         **settings: the command's options by their names in Python, such as ``steps=3000`` or
             ``splats=20_000``; see ``FitPhotosSettings`` and ``FitXraySettings``.
 
     Raises:
+        StoppedError: it was broken off by ``progress`` or by an interrupt.
         RiftError: a setting, the capture, the device or the folder cannot be used.
     """
     from rift_cl.commands.fit_photos.job import Fit
@@ -145,7 +153,7 @@ def evaluate(
         scene: a fit, its folder, or a file of splats.
         captures: what to score it by; the photographs that the fit held out when not given.
         out: folder for report.html, config.json and metrics.json; a temporary one when not given.
-        progress: is called with a report for each picture.
+        progress: is called with a report for each picture; breaks off by returning False.
         **settings: the command's options by their names in Python; see ``EvalSettings``.
 
     Raises:
@@ -172,7 +180,7 @@ def render(
         scene: a fit, its folder, or a file of splats.
         out: folder for frames, the film, transforms.json and report.html; a temporary one when not
             given.
-        progress: is called with a report for each frame.
+        progress: is called with a report for each frame; breaks off by returning False.
         **settings: the command's options by their names in Python, such as ``frames=24`` or
             ``size=(320, 240)``; see ``RenderSettings``.
 
@@ -207,7 +215,7 @@ def analyze(
         source: a capture, a fit, or a scan.
         out: folder for report.html, config.json, metrics.json and views.csv; a temporary one when
             not given.
-        progress: is called with a report after every step.
+        progress: is called with a report after every step; breaks off by returning False.
         **settings: the command's options by their names in Python; see ``AnalyzeSettings``.
 
     Raises:
@@ -235,7 +243,7 @@ def plan_views(
     Args:
         views: how many to plan; with ``have``, how many more.
         out: folder for transforms.json, views.csv and report.html; a temporary one when not given.
-        progress: is called with a report after every step.
+        progress: is called with a report after every step; breaks off by returning False.
         **settings: the command's options by their names in Python, such as ``diameter=60`` or
             ``elevation=(0, 70)``; see ``PlanSettings``.
 
@@ -261,7 +269,7 @@ def export(
     Args:
         scene: a fit, its folder, or a file of splats.
         out: the file; the scene's name in the current folder when not given.
-        progress: is called with a report now and then.
+        progress: is called with a report now and then; breaks off by returning False.
         **settings: the command's options by their names in Python, such as ``to="spz"`` or
             ``mesh=True``; see ``ExportSettings``.
 
@@ -328,6 +336,9 @@ def _folder(out: PathLike | None) -> Iterator[tuple[Path, Callable[[R], R]]]:
 
     try:
         yield folder, tied
+    except StoppedError:
+        shutil.rmtree(folder, ignore_errors=True)
+        raise StoppedError("interrupted; nothing was kept, since no out was given") from None
     except BaseException:
         shutil.rmtree(folder, ignore_errors=True)
         raise
@@ -380,9 +391,33 @@ def _plain(value: Any) -> Any:
 
 
 def _run(job: Any, progress: Progress) -> None:
-    with released(job):
+    """Run a job to its end, or to where a caller or an interrupt breaks it off.
+
+    Raises:
+        StoppedError: it was broken off.
+    """
+    stop = getattr(job, "stop", None)
+    heeded = nullcontext() if stop is None else gentle_interrupt(stop, plain_interrupt())
+    with released(job), heeded:
+        reports = job.run()
         if isinstance(progress, bool) or progress is None:
-            show_progress(job.run(), quiet=not progress)
+            show_progress(reports, quiet=not progress)
             return
-        for report in job.run():
-            progress(report)
+        for report in reports:
+            if progress(report) is False:
+                _break_off(reports, stop)
+
+
+def _break_off(reports: Any, stop: Callable[[], None] | None) -> None:
+    """Do to a job what Ctrl-C does between two of its reports.
+
+    Raises:
+        StoppedError: it has ended by that; one with a ``stop`` ends after the step it is taking.
+    """
+    if stop is not None:
+        stop()
+        return
+    try:
+        reports.throw(KeyboardInterrupt)
+    except KeyboardInterrupt:
+        raise StoppedError("interrupted; no file is half-written") from None

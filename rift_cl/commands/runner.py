@@ -10,11 +10,9 @@ from __future__ import annotations
 import os
 import signal
 import sys
-import threading
 import traceback
 import warnings
-from collections.abc import Callable, Iterable, Iterator
-from contextlib import ExitStack, contextmanager
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field, make_dataclass
 from inspect import Parameter, Signature
 from pathlib import Path
@@ -24,6 +22,7 @@ from typing import Annotated, Any, Literal, NamedTuple, get_args, get_origin
 import tyro
 
 from rift_cl.commands.console_table import print_table
+from rift_cl.commands.interrupts import heeded
 from rift_cl.commands.options import MISSING, ShownOption, assembled, shown_options
 from rift_cl.commands.progress_bar import print_line, show_progress
 from rift_cl.errors import RiftError, SettingError
@@ -58,7 +57,7 @@ class Terminated(KeyboardInterrupt):
 def exit_status(run: Callable[[], int]) -> int:
     """Run a command line; what ends it from outside becomes a sentence and an exit status."""
     try:
-        with _heard((signal.SIGTERM,), _terminate):
+        with heeded((signal.SIGTERM,), _terminate):
             status = run()
         if sys.stdout is not None:
             sys.stdout.flush()
@@ -270,36 +269,6 @@ def _say(sentence: str, status: int) -> int:
 
 def _show_warning(message: Warning | str, *_: Any, **__: Any) -> None:
     print_line(f"rift: warning: {message}")
-
-
-@contextmanager
-def gentle_interrupt(stop: Callable[[], None]) -> Iterator[None]:
-    """Call ``stop`` at the first Ctrl-C or SIGTERM; the second breaks off at once, as usual."""
-    with ExitStack() as usual:
-
-        def heard(number: int, frame: FrameType | None) -> None:
-            usual.close()
-            stop()
-            print_line("rift: stopping after this step; a second Ctrl-C or SIGTERM stops at once")
-
-        usual.enter_context(_heard((signal.SIGINT, signal.SIGTERM), heard))
-        yield
-
-
-@contextmanager
-def _heard(
-    signals: Iterable[signal.Signals], heard: Callable[[int, FrameType | None], None]
-) -> Iterator[None]:
-    """Have signals call a function, in the main thread, whose they are; elsewhere do nothing."""
-    if threading.current_thread() is not threading.main_thread():
-        yield
-        return
-    usual = {number: signal.signal(number, heard) for number in signals}
-    try:
-        yield
-    finally:
-        for number, handler in usual.items():
-            signal.signal(number, signal.SIG_DFL if handler is None else handler)
 
 
 def _terminate(number: int, frame: FrameType | None) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import gc
+import signal
 from pathlib import Path
 
 import numpy as np
@@ -10,7 +11,7 @@ import pytest
 
 import rift_cl as rift
 from rift_cl.commands.cli import main
-from rift_cl.errors import InputError
+from rift_cl.errors import InputError, StoppedError
 
 SMALL = {"steps": 20, "splats": 100, "hold_out": 4}
 
@@ -123,3 +124,88 @@ def test_a_failed_command_leaves_no_folder(tmp_path, monkeypatch, capsys):
     with pytest.raises(InputError, match="dry_run"):
         rift.analyze(tmp_path, dry_run=True)
     assert not list(tmp_path.iterdir())
+
+
+def steps_of(capture, out, at_step=lambda report: None, **given):
+    """The steps that a fit reports, and what it gives back."""
+    seen = []
+
+    def progress(report):
+        if report.what == "steps":
+            seen.append(report.done)
+            return at_step(report)
+        return None
+
+    return seen, rift.fit(capture, out, progress=progress, **{**SMALL, "steps": 60, **given})
+
+
+def interrupted(report):
+    """What Ctrl-C and a notebook's button do."""
+    if report.done == 25:
+        signal.raise_signal(signal.SIGINT)
+
+
+@pytest.fixture
+def plain_interrupt():
+    """The handler is Python's own and stays it; a background job ignores Ctrl-C."""
+    usual = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    after = signal.signal(signal.SIGINT, usual)
+    assert after is signal.default_int_handler
+
+
+@pytest.mark.usefixtures("plain_interrupt")
+@pytest.mark.parametrize("at_step", [lambda report: False, interrupted], ids=["asked", "signal"])
+def test_a_fit_that_is_broken_off_keeps_a_checkpoint(at_step, fitted, capture, tmp_path, capsys):
+    out = tmp_path / "fit"
+    with pytest.raises(StoppedError, match=r"after step 25 of 60; to go on: .*--resume"):
+        steps_of(capture, out, at_step)
+    assert ("stopping after this step" in capsys.readouterr().err) == (at_step is interrupted)
+    seen, made = steps_of(capture, out, resume=True)
+    assert seen == [50, 60]
+    assert not any("no checkpoint" in note for note in made.notes)
+
+
+def test_a_fit_without_a_checkpoint_to_go_on_from_says_so(fitted, capture, tmp_path):
+    def fail(report):
+        raise RuntimeError("a mistake of the caller's")
+
+    with pytest.raises(RuntimeError):
+        steps_of(capture, tmp_path / "fit", fail)
+    seen, made = steps_of(capture, tmp_path / "fit", resume=True)
+    assert seen == [25, 50, 60]
+    assert any("no checkpoint to go on from" in note for note in made.notes)
+
+
+def test_a_handler_of_the_caller_s_hears_the_interrupt(fitted, capture, tmp_path):
+    heard = []
+    usual = signal.signal(signal.SIGINT, lambda *_: heard.append(True))
+    try:
+        seen, _ = steps_of(capture, tmp_path / "fit", interrupted)
+    finally:
+        signal.signal(signal.SIGINT, usual)
+    assert heard and seen == [25, 50, 60]
+
+
+def test_any_function_is_broken_off_by_its_progress(fitted, tmp_path, monkeypatch):
+    with pytest.raises(StoppedError, match="no file is half-written"):
+        rift.render(
+            fitted, tmp_path / "film", frames=3, size=(40, 30), progress=lambda report: False
+        )
+    assert not list(tmp_path.glob("**/*.part"))
+    monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
+    with pytest.raises(StoppedError, match="no out was given"):
+        rift.render(fitted, frames=3, size=(40, 30), progress=lambda report: False)
+    assert [path.name for path in tmp_path.iterdir()] == ["film"]
+
+
+def test_a_reconstruction_is_broken_off_by_its_progress_and_goes_on(tmp_path):
+    grid, scan = rift.Grid((6, 24, 24)), rift.Parallel(np.arange(32) * np.pi / 32, 24)
+    values = rift.phantom.shepp_logan_sinogram(grid, scan)
+    path, out = tmp_path / "scan.npz", tmp_path / "out"
+    np.savez(path, sinogram=values, angles=scan.angles)
+    with pytest.raises(StoppedError, match="6 of 6 slices are kept"):
+        rift.reconstruct_scan(path, out, center=11.5, progress=lambda report: report.done < 6)
+    seen = []
+    rift.reconstruct_scan(path, out, center=11.5, resume=True, progress=seen.append)
+    assert all(report.done == 6 for report in seen)

@@ -60,6 +60,7 @@ def test_a_capture_of_the_package_is_copied_once(name, views, tmp_path, capsys):
     # Of a name that a copy in the making might have.
     (tmp_path / "capture.part").mkdir()
     (tmp_path / "capture.part" / "mine").touch()
+    out.mkdir()  # an empty folder is as good as none
     assert main(["samples", name, "--out", str(out)]) == 0
     assert len(open_capture(out).views) == views
     assert main(["samples", name, "--out", str(out)]) != 0

@@ -12,7 +12,8 @@ import pytest
 from rift_cl.commands.cli import main
 from rift_cl.commands.fit import checkpoints
 from rift_cl.commands.fit.checkpoints import CheckpointSchedule
-from rift_cl.commands.runner import exit_status, gentle_interrupt
+from rift_cl.commands.interrupts import gentle_interrupt
+from rift_cl.commands.runner import exit_status
 
 
 @pytest.fixture(autouse=True)

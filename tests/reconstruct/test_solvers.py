@@ -14,6 +14,7 @@ from rift_cl.reconstruct.solvers.fista import Fista
 from rift_cl.reconstruct.solvers.pdhg import Pdhg
 from rift_cl.reconstruct.solvers.simultaneous_iteration import Sirt, sirt
 from rift_cl.reconstruct.solvers.tv import tv
+from rift_cl.reconstruct.solvers.variation_weight import variation_weight
 from rift_cl.reference import total_variation as twin
 
 pytestmark = pytest.mark.once
@@ -89,6 +90,30 @@ def test_fista_and_pdhg_reach_the_same_minimum(device, weight, nonnegative, prec
             aside = image + 0.01 * RANDOM.standard_normal(image.shape).astype(np.float32)
             aside = np.maximum(aside, 0) if nonnegative else aside
             assert objective(A, y, weight, aside, F) > value
+
+
+@pytest.mark.parametrize("precondition", [None, "ramp"])
+@pytest.mark.parametrize("factor", [100, 1000])
+def test_pdhg_is_near_the_minimum_whatever_the_weight(device, factor, precondition):
+    A, _, _, y = problem(device, noise=0.1)
+    weight = factor * variation_weight(A, y)
+    given = {"precondition": precondition}
+    best = finished(Fista(A, y, weight, **given), 200)[-1].values["objective"]
+    found = finished(Pdhg(A, y, weight, **given), 200)[-1].values["objective"]
+    assert found < best * (1 + 4e-3)
+
+
+@pytest.mark.parametrize("precondition", [None, "ramp"])
+def test_steps_of_pdhg_converge_whatever_the_weight(device, precondition):
+    """Steps times norms are 1 together; weak weights leave the usual steps, and y of zeros does."""
+    A, _, _, y = problem(device, noise=0.1)
+    taus = []
+    for weight, data in ((0.0, y), (1e-3, y), (0.1, 0 * y), (10.0, y), (1e12, y)):
+        solver = Pdhg(A, data, weight, precondition=precondition)
+        slope = solver._sigma * solver._largest + solver._step * solver.variation.norm_squared
+        assert solver._tau * slope == pytest.approx(1, rel=1e-12)
+        taus.append(solver._tau)
+    assert taus[0] == taus[1] == taus[2] > taus[3] > taus[4] > 0
 
 
 def test_total_variation_bounds_the_gap_to_its_dual(device):

@@ -1,6 +1,7 @@
 """The tools of fans, cones and vectors print what they say: what is true, and what tilts cost."""
 
 import re
+import sys
 
 import numpy as np
 import pytest
@@ -54,6 +55,14 @@ def test_fans_are_as_true_as_the_peer_s(tool, monkeypatch, capsys):
     tool("bench_fan").main()
     ours, peer = map(float, re.findall(r" (0\.\d+)", capsys.readouterr().out)[:2])
     assert ours == pytest.approx(peer, rel=0.05)
+
+
+def test_fans_are_not_timed_without_the_peer(tool, monkeypatch, capsys):
+    monkeypatch.setitem(sys.modules, "astra", None)
+    monkeypatch.setattr("sys.argv", ["bench_fan.py"])
+    with pytest.raises(SystemExit):
+        tool("bench_fan").main()
+    assert "pip install astra-toolbox" in capsys.readouterr().err
 
 
 @pytest.mark.full

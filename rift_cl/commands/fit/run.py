@@ -49,7 +49,8 @@ class FitRun(ABC, Generic[S]):
         self.checkpoints = FitCheckpoints(
             settings.out / "checkpoints", settings.decisive(), self.device.name
         )
-        if settings.resume and not self.checkpoints.find():
+        self._goes_on = settings.resume and self.checkpoints.find()
+        if settings.resume and not self._goes_on:
             self._demand_a_beginning()
         self.losses: list[tuple[int, float]] = []
         self.scores: dict[str, list[ViewScore]] = {}
@@ -94,6 +95,10 @@ class FitRun(ABC, Generic[S]):
             self.checkpoints.fitted(self._inputs())
         self.checkpoints.decided = self.settled.decisive()
         if self.settings.resume:
+            if not self._goes_on:
+                self.announce(
+                    f"rift: {self.settings.out}: no checkpoint to go on from: from step 0"
+                )
             self.losses = self.checkpoints.restore(trainer)
         else:
             self.folder.mark(**self.decided)
@@ -107,9 +112,13 @@ class FitRun(ABC, Generic[S]):
             if report.done % REPORT_EVERY == 0 or report.done == report.total:
                 self.losses.append((report.done, report.values["loss"]))
             ended = self._stopping or report.done == report.total
-            if schedule.due(report.done, ended=ended):
+            kept = schedule.due(report.done, ended=ended)
+            if kept:
                 self.checkpoints.save(trainer, self.losses)
             yield report
+            # Whoever was told of this step may have asked for the end by then.
+            if self._stopping and not kept and schedule.due(report.done, ended=True):
+                self.checkpoints.save(trainer, self.losses)
             self._heed(report.done)
 
     def _demand_a_beginning(self) -> None:

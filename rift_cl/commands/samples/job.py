@@ -64,9 +64,9 @@ def put_sample(settings: SamplesSettings) -> Path:
 
 
 def _copied_capture(source: Path, folder: Path) -> Path:
-    if folder.exists():
-        raise OutputError(f"{folder}: is there already; name another folder by --out")
     with writing(folder):
+        if folder.exists() and not (folder.is_dir() and not any(folder.iterdir())):
+            raise OutputError(f"{folder}: is there already; name another folder by --out")
         # Beside it and of a name of its own, so that nothing that is there is touched.
         own = Path(tempfile.mkdtemp(dir=folder.parent, prefix=f"{folder.name}."))
         try:

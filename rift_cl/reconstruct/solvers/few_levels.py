@@ -95,8 +95,7 @@ class FewLevels(Pdhg):
             direction_weights=direction_weights,
             sigma=sigma,
         )
-        greatest = 1 / (2 * self._sigma * self._tau)
-        self._pull = float(pull) * greatest
+        self._pull = float(pull) * self._largest
         self._tau = 1 / (1 / self._tau + self._pull)
         self._steps = self.data.device.array(levels, self.data.dtype)
 
