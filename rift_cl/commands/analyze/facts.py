@@ -100,7 +100,7 @@ def _resolved_by(frequency: float, sampled: ViewSet) -> str:
     """The resolution of the slices in nine tenths of all directions, as part of a sentence."""
     if frequency * sampled.target.diameter < 1:
         return ", and leave more than a tenth of all directions unresolved"
-    return f", and resolve {1 / frequency:.3g} {sampled.units}"
+    return f", and resolve {1 / frequency:.3g} {sampled.units} in nine tenths of all directions"
 
 
 def _holes(found: dict[int, Orlov], unit: str) -> Table:
@@ -174,8 +174,8 @@ def resolution(sampled: ViewSet, names: tuple[str, ...]) -> Findings:
     sentences = (
         _ended(found, names[0], sampled),
         f"By Crowther's criterion {needed} views evenly spaced on a circle resolve periods of "
-        f"{1 / target.highest:.3g} {units}; {count.views} of these views see the target's "
-        f"centre{_resolved_by(count.frequency, sampled)}.",
+        f"{1 / target.highest:.3g} {units} in all directions; {count.views} of these views see the "
+        f"target's centre{_resolved_by(count.frequency, sampled)}.",
     )
     reached = {"needed": needed, "wanted": target.highest, "frequency": count.frequency}
     record = {"limits": points, "crowther": {"views": count.views, **reached}}
