@@ -10,17 +10,21 @@ The spaces of functions that ODL discretizes weigh their inner products by the s
 is smaller at the boundary if nodes lie on it. ``to_odl`` gives the adjoint that goes by these
 weights; ``from_odl`` gives the transpose, without weights, as all of our operators have it. A power
 of a space, as gradients map to, is an array with one axis more, which comes first.
+
+Axis 0 of ODL's images is x; that of ours is y, or z. Arrays pass as they are, so that axis 0 of the
+domain is y, unless ``to_odl(A, axes="xy")`` asks for elements as ODL's phantoms and plots are.
 """
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rift_cl.cl.device import Device
-from rift_cl.errors import DTypeError, ShapeError
+from rift_cl.errors import DTypeError, InputError, ShapeError
+from rift_cl.geometry import Grid
 from rift_cl.interop.optional_package import optional_package
 from rift_cl.operators.host_operator import HostOperator
 from rift_cl.operators.linear import LinearOperator
@@ -28,27 +32,38 @@ from rift_cl.operators.linear import LinearOperator
 __all__ = ["from_odl", "to_odl"]
 
 Weights = float | NDArray[np.float64]
+Axes = Literal["yx", "xy"]
 _ENDS = ("domain", "range")
+# By how much of a spacing a space may sample an image elsewhere than the operator's grid does.
+_OFF = 1e-3
 
 
-def to_odl(A: LinearOperator, *, domain: Any = None, range: Any = None) -> Any:
+def to_odl(A: LinearOperator, *, domain: Any = None, range: Any = None, axes: Axes = "yx") -> Any:
     """An operator as an ``odl.Operator``.
 
     Args:
         A: a projector, its adjoint, ``FilteredBackprojection``, any sum or product.
-        domain: a space of ODL's of shape ``A.domain``; ``odl.rn`` of the operator's type if not
-            given.
-        range: the same of ``A.range``.
+        domain: a space of ODL's of shape ``A.domain``, which, if it discretizes functions, samples
+            them where the operator's grid does; ``odl.rn`` of the operator's type if not given.
+        range: the same of ``A.range``; its axes stay as they are: angles, rows, bins.
+        axes: of an image, an element of the domain: ``yx``, as our arrays, (y, x) or (z, y, x);
+            or ``xy``, as ODL has them, (x, y) or (x, y, z), of shape ``A.domain[::-1]``.
 
     Raises:
         DTypeError: A is no operator of this package, or a space is not of real numbers or its
             inner product is more than a weight for each sample.
         ShapeError: a space has another shape.
-        InputError: ODL is not installed.
+        InputError: ODL is not installed; the domain samples other places than the grid; or ``xy``
+            is asked of an operator whose domain is not known to be an image.
     """
     odl = optional_package("odl", what="to_odl")
     if not isinstance(A, LinearOperator):
         raise DTypeError(f"A is a {type(A).__name__}, wanted a linear operator of rift_cl")
+    if axes not in get_args(Axes):
+        raise InputError(f"axes is {axes!r}, wanted one of {', '.join(get_args(Axes))}")
+    grid = A.grid
+    if axes == "xy":
+        A = _with_x_first(A)
     spaces = [
         odl.rn(shape, dtype=A.dtype.name) if space is None else space
         for space, shape in ((domain, A.domain), (range, A.range))
@@ -61,6 +76,8 @@ def to_odl(A: LinearOperator, *, domain: Any = None, range: Any = None) -> Any:
                 f"{name} is a space of {_dtype(space)}, wanted real numbers: our operators are "
                 "real, and apply to real and imaginary parts one after the other"
             )
+    if grid is not None:
+        _check_places(spaces[0], grid, axes)
     weights = _weights("domain", spaces[0]), _weights("range", spaces[1])
     return _made(odl, A, tuple(spaces), weights)
 
@@ -98,6 +115,45 @@ def from_odl(P: Any, *, device: Device | None = None) -> LinearOperator:
         dtype=np.result_type(*(_dtype(space) for space in spaces)),
         device=device,
     )
+
+
+def _with_x_first(A: LinearOperator) -> LinearOperator:
+    """The operator on images whose axes are x, y and z."""
+    if A.grid is None:
+        raise InputError(
+            "axes is 'xy', and A does not say that its domain is an image: take that of a "
+            "projector, and its adjoint by ODL"
+        )
+    return HostOperator(
+        lambda x: A(x.T),
+        lambda y: A.T(y).T,
+        A.domain[::-1],
+        A.range,
+        dtype=A.dtype,
+        device=A.device,
+    )
+
+
+def _check_places(space: Any, grid: Grid, axes: Axes) -> None:
+    """Refuse a space of functions whose samples lie elsewhere than the operator's.
+
+    Raises:
+        InputError: they do, by the first axis that differs.
+    """
+    if not hasattr(space, "partition"):
+        return
+    order = list(enumerate("zyx"[-len(grid.shape) :]))
+    for places, (axis, name) in zip(
+        space.grid.coord_vectors, order if axes == "yx" else reversed(order), strict=True
+    ):
+        wanted, step = grid.coordinates(axis), grid.spacing[axis]
+        if not np.allclose(places, wanted, rtol=0, atol=_OFF * step):
+            low, high = wanted[0] - step / 2, wanted[-1] + step / 2
+            raise InputError(
+                f"domain samples {name} from {places[0]:g} to {places[-1]:g}, the operator's grid "
+                f"from {wanted[0]:g} to {wanted[-1]:g}: let it reach from {low:g} to {high:g}, "
+                "without nodes on the boundary, or give the grid its spacing and centre"
+            )
 
 
 def _made(

@@ -104,6 +104,10 @@ def finite_depth_optimum(
     1.83 / sqrt(wavelength depth) depends neither on distance nor on focal length or pixel; several
     exposures with focus in so many planes divide the depth, and gain their square root.
 
+    Both are to first order in depth / distance, with focus on the target's middle. Of a target a
+    tenth as deep as it is far the worse end is resolved 2 % less (``safe``: 4 %), of one a fifth as
+    deep 5 % (8 %), of two fifths 24 % (15 %).
+
     Args:
         depth: of the target along the axis.
         distance: of its middle from the entrance pupil.

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import re
 from dataclasses import replace
 
 import h5py
@@ -137,8 +138,12 @@ def test_a_parallel_scan_has_directions_and_no_cameras(scan, tmp_path, capsys):
     assert found["crowther"]["needed"] == math.ceil(math.pi * 96 / 2)
     assert page_of(tmp_path / "all").count("<img") == 3
     assert not (tmp_path / "all" / "views.csv").exists()
-    printed = capsys.readouterr().out
+    printed = " ".join(capsys.readouterr().out.split())
     assert "Crowther" in printed and "To add:" in printed
+    # Crowther's own pi D / K is of all directions, and a ninth longer.
+    (period,) = re.findall(r"and resolve (\S+) .+ in nine tenths of all directions", printed)
+    own = math.pi * found["target"]["diameter"] / 150
+    assert float(period) == pytest.approx(0.9 * own, rel=0.02)
 
 
 def test_the_axis_of_counts_is_searched_in_their_line_integrals(scan, tmp_path, capsys):

@@ -76,6 +76,8 @@ def test_no_camera_is_suggested_behind_a_wall_that_sparse_points_show(walled, tm
     # Fur is resolved however few the views are.
     assert {point["limited_by"] for point in found["limits"]} == {"pixel"}
     assert "number of views" not in page and "the sparse points" in page
+    # Geometry is known: suggestions go wherever it leaves room.
+    assert "from the views at hand" not in page
     # What did not hold against held-out photographs is not said.
     assert "farthest from all views" in page and "a pixel of parallax is" not in page
 
@@ -95,12 +97,27 @@ def test_fitted_splats_tell_what_is_in_the_way_as_well(tmp_path):
 
 
 @pytest.mark.full
-def test_where_nothing_tells_what_stands_where_suggestions_stay_near(tmp_path):
-    sampled = open_sampled(AnalyzeSettings(capture(tmp_path / "bare", arc()), diameter=1.2))
+def test_where_nothing_tells_what_stands_where_suggestions_stay_near_and_say_so(tmp_path, capsys):
+    folder, out = capture(tmp_path / "bare", arc()), tmp_path / "out"
+    sampled = open_sampled(AnalyzeSettings(folder, diameter=1.2))
     assert sampled.space is None
-    for camera in cameras_to_add(sampled, 2):
-        way = camera.center / np.linalg.norm(camera.center)
+    words = ["--diameter", "1.2", "--add", "2", "--quiet"]
+    assert main(["analyze", str(folder), "--out", str(out), *words]) == 0
+    assert f"about {ASTRAY:.0f} degrees from the views at hand" in capsys.readouterr().out
+    for row in csv.DictReader((out / "views.csv").read_text().splitlines()):
+        place = np.array([float(row[axis]) for axis in "xyz"])
+        way = place / np.linalg.norm(place)
         assert (sampled.directions() @ way).max() > math.cos(math.radians(ASTRAY + 3))
+
+
+def test_an_arc_is_told_of_the_side_that_it_misses(tmp_path, capsys):
+    folder, out = capture(tmp_path / "bare", arc()), tmp_path / "out"
+    words = ["--diameter", "1.2", "--add", "0", "--quiet"]
+    assert main(["analyze", str(folder), "--out", str(out), *words]) == 0
+    printed, found = capsys.readouterr().out, metrics_of(out)
+    assert found["largest_gap_degrees"] > 90
+    assert f"is {found['largest_gap_degrees']:.3g} degrees from the nearest" in printed
+    assert f"{found['uncovered_sides']:.1%} of the target's sides are seen by no view" in printed
 
 
 @pytest.mark.full

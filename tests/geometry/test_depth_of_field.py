@@ -101,6 +101,24 @@ def test_neither_distance_nor_lens_moves_the_limit_but_planes_of_focus_do() -> N
     assert four.cutoff == pytest.approx(2 * near.cutoff)
 
 
+@pytest.mark.parametrize(
+    ("safe", "missing"), [(False, (0.02, 0.05, 0.24)), (True, (0.04, 0.08, 0.15))]
+)
+def test_the_worse_end_of_a_deep_target_is_resolved_as_much_less_as_is_said(
+    safe: bool, missing: tuple[float, ...]
+) -> None:
+    """Each end at its own distance, in light and in defocus: A^2 |1/end - 1/focus| / 8."""
+    v, depth = np.linspace(0, 1, 4001), 60.0
+    for share, wanted in zip((0.1, 0.2, 0.4), missing, strict=True):
+        distance = depth / share
+        found, ends = finite_depth_optimum(depth, distance, GREEN, safe=safe), []
+        for end in (distance - depth / 2, distance + depth / 2):
+            waves = found.diameter**2 * abs(1 / end - 1 / distance) / (8 * GREEN)
+            first = v[np.argmax(defocused_otf(v, waves) < 0.1)]
+            ends.append(float(first) * incoherent_cutoff(found.diameter, end, GREEN))
+        assert 1 - min(ends) / found.cutoff == pytest.approx(wanted, abs=0.006)
+
+
 @pytest.mark.parametrize("bad", [0, -1.0, math.nan, "deep"])
 def test_lengths_are_positive(bad: float) -> None:
     for call in (

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import rift_cl as rift
-from rift_cl.errors import DTypeError, ShapeError
+from rift_cl.errors import DTypeError, InputError, ShapeError
 from rift_cl.interop.odl import from_odl, to_odl
 
 # ODL warns of what Python and NumPy have given up.
@@ -18,9 +18,17 @@ def odl():
     return pytest.importorskip("odl", reason="ODL is not installed")
 
 
-def projector(device):
-    grid, scan = rift.Grid((6, 7)), rift.Parallel(np.linspace(0, 3, 8), 9)
-    return rift.Projector(grid, scan, device=device)
+def projector(device, grid=None):
+    grid = rift.Grid((6, 7)) if grid is None else grid
+    return rift.Projector(grid, rift.Parallel(np.linspace(0, 3, 8), 9), device=device)
+
+
+def grid_of(space):
+    """The grid that samples where a space of functions of y and x does; a plain one otherwise."""
+    if not hasattr(space, "partition"):
+        return rift.Grid(space.shape)
+    middles = [(places[0] + places[-1]) / 2 for places in space.grid.coord_vectors]
+    return rift.Grid(space.shape, tuple(space.cell_sides), tuple(middles))
 
 
 def white(*shape):
@@ -64,7 +72,8 @@ def spaces_of(odl, kind):
 @pytest.mark.each
 @pytest.mark.parametrize("kind", ["nodes", "one edge", "weights", "parts"])
 def test_the_adjoint_holds_where_samples_have_weights_of_their_own(device, odl, kind):
-    A, (domain, range) = projector(device), spaces_of(odl, kind)
+    domain, range = spaces_of(odl, kind)
+    A = projector(device, grid_of(domain))
     P = to_odl(A, domain=domain, range=range)
     x, y = domain.element(white(6, 7)), range.element(white(8, 9))
     np.testing.assert_allclose(P(x).asarray(), A(white(6, 7)), rtol=1e-6)
@@ -92,6 +101,39 @@ def test_spaces_that_our_operators_know_nothing_of_are_refused(device, odl):
         to_odl(A, range=own)
     with pytest.raises(DTypeError, match="domain has no inner product"):
         to_odl(A, domain=odl.rn((6, 7), dtype="float32", exponent=1.0))
+
+
+def test_a_function_of_x_and_y_is_projected_where_it_is(device, odl):
+    """A blob at (2, -0.5) lies at x in the first view, and at y a quarter of a turn on."""
+    grid = rift.Grid((8, 12), spacing=(0.5, 1.0), center=(0.0, 1.0))
+    scan = rift.Parallel([0.0, np.pi / 2], 41, 0.25)
+    A = rift.Projector(grid, scan, device=device)
+    space = odl.uniform_discr([-5, -2], [7, 2], (12, 8), dtype="float32")
+    f = space.element(lambda p: np.exp(-2 * ((p[0] - 2) ** 2 + (p[1] + 0.5) ** 2)))
+    P = to_odl(A, domain=space, axes="xy")
+    y = P(f).asarray()
+    np.testing.assert_allclose(y @ scan.coordinates() / y.sum(axis=1), [2, -0.5], atol=0.05)
+    assert np.array_equal(y, A(f.asarray().T))
+    v = P.range.element(white(2, 41))
+    assert np.isclose(P(f).inner(v), f.inner(P.adjoint(v)), rtol=1e-4)
+    assert to_odl(A, axes="xy").domain.shape == (12, 8)
+
+
+def test_functions_that_are_sampled_elsewhere_than_the_grid_are_refused(device, odl):
+    A, ends = projector(device), ([-3, -3.5], [3, 3.5])
+    for low, high, axis in (
+        ([-1, -3.5], [1, 3.5], "y"),
+        ([-3, 0], [3, 7], "x"),
+        ([-3.5, -3], [3.5, 3], "y"),
+    ):
+        with pytest.raises(InputError, match=f"domain samples {axis} from"):
+            to_odl(A, domain=odl.uniform_discr(low, high, (6, 7), dtype="float32"))
+    with pytest.raises(InputError, match="nodes on the boundary"):
+        to_odl(A, domain=odl.uniform_discr(*ends, (6, 7), dtype="float32", nodes_on_bdry=True))
+    with pytest.raises(InputError, match="A does not say that its domain is an image"):
+        to_odl(A.T, axes="xy")
+    with pytest.raises(InputError, match="axes is 'zx'"):
+        to_odl(A, axes="zx")
 
 
 def test_their_solver_takes_our_operator(device, odl):

@@ -14,7 +14,7 @@ from rift_cl.sampling.criteria.exact import exact
 from rift_cl.sampling.criteria.kriging import kriging
 from rift_cl.sampling.criteria.merit import criterion_of_coverage, merit
 from rift_cl.sampling.targets.observations import Observations
-from rift_cl.sampling.targets.prior import directions_for
+from rift_cl.sampling.targets.prior import PowerLaw, directions_for
 from rift_cl.sampling.targets.target import Target, half_ball
 
 KINDS = ("wiener", "logdet", "worst")
@@ -54,6 +54,21 @@ def test_bits_that_a_view_brings_shrink_as_others_are_there(seed, target):
         for some in (few, many)
     ]
     assert gain[0] >= gain[1] > 0
+
+
+@pytest.mark.parametrize(
+    ("count", "reach", "stated", "wanted"),
+    [(6, 150, 0.199, 0.291), (12, 165, 0.071, 0.135), (12, 100, 0.201, 0.172)],
+)
+def test_what_a_share_states_is_no_bound_on_the_exact_one(count, reach, stated, wanted):
+    """Figures that ``docs/explanation/sampling.md`` states: the last over a sector, not even."""
+    flat = Target.flat(24.0, band=0.5, snr=1e4, prior=PowerLaw(2.0))
+    turns = np.radians(np.linspace(0, reach, count))
+    eyes = 200 * np.column_stack([np.cos(turns), np.sin(turns), 0 * turns])
+    K = [[2000.0, 0, 200], [0, 2000, 200], [0, 0, 1]]
+    views = [Camera((400, 400), K, look_at(eye, (0, 0, 0), (0, 0, 1))) for eye in eyes]
+    assert merit(views, flat).value == pytest.approx(stated, abs=1e-3)
+    assert merit(views, flat, "exact").value == pytest.approx(wanted, abs=1e-3)
 
 
 @pytest.mark.parametrize("kind", ["wiener", "worst"])

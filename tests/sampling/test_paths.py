@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from rift_cl.errors import InputError
+from rift_cl.sampling.planning.baselines import baselines
 from rift_cl.sampling.planning.constraints import Constraints
 from rift_cl.sampling.planning.curves import curves_of
 from rift_cl.sampling.planning.design_space import DesignSpace, default_types
@@ -71,6 +72,33 @@ def test_a_ring_is_level_and_even_and_an_arc_ends_at_its_limits():
     arc = plan(TARGET, 9, PATHS["arc"])
     np.testing.assert_allclose(arc.azimuth, np.linspace(-1, 1, 9), atol=1e-9)
     assert np.ptp(arc.elevation) < 1e-9
+
+
+@pytest.mark.parametrize("path", [Free(), Ring(), Spline(6)])
+def test_what_a_path_is_compared_with_has_no_gap_where_a_keep_out_is(path):
+    near = DesignSpace(TARGET, Constraints(), default_types(TARGET)).limits[0, 2, 0]
+    limits = Constraints(path=path, keepouts=(KeepOut(Sphere((near, 0, 0), 0.6 * near)),))
+    design = DesignSpace(TARGET, limits, default_types(TARGET))
+    found = baselines(Objective(design), 9)
+    for baseline in found.values():
+        assert permitted(design, baseline.view_table)
+    ring = found["ring"]
+    azimuth = np.sort(ring.view_table.table[:, 0] % (2 * math.pi))
+    widest = np.diff([*azimuth, azimuth[0] + 2 * math.pi]).max()
+    whole = widest < 1.02 * 2 * math.pi / 9
+    assert whole == (not isinstance(path, Free))
+    assert ring.described.endswith("with a gap") != whole
+
+
+def test_a_whole_ring_steps_over_a_small_keep_out():
+    near = DesignSpace(TARGET, Constraints(), default_types(TARGET)).limits[0, 2, 0]
+    first = near * np.array([math.cos(math.pi / 9), math.sin(math.pi / 9), 0])
+    ball = KeepOut(Sphere(tuple(first), 0.1 * near))
+    limits = Constraints(path=Ring(), elevation=(0, 0), keepouts=(ball,))
+    design = DesignSpace(TARGET, limits, default_types(TARGET))
+    view_table = baselines(Objective(design), 9)["ring"].view_table
+    assert permitted(design, view_table)
+    np.testing.assert_allclose(np.diff(np.unwrap(view_table.table[:, 0])), 2 * math.pi / 9)
 
 
 def test_tilted_rings_are_circles_with_axes_of_their_own():

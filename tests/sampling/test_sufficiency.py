@@ -117,6 +117,23 @@ def test_one_ring_fails_tuy_and_two_meet_it():
     assert not tuy(two, Target((0, 0, 0), 18.0)).satisfied
 
 
+@pytest.mark.parametrize(("radius", "diameter"), [(3, 4), (10, 4), (10, 18), (10, 1)])
+def test_the_planes_that_a_ring_does_not_meet_are_as_many_as_their_integral(radius, diameter):
+    """At t from the axis the ring meets those up to ``radius sin(t)`` from the middle."""
+    t = (np.arange(2000) + 0.5) / 2000 * np.pi / 2
+    met = np.minimum(1, 2 * radius * np.sin(t) / diameter)
+    wanted = np.mean(np.sin(t) * (1 - met)) * np.pi / 2
+    found = tuy(ring_of_cameras(64, radius), Target((0, 0, 0), diameter))
+    assert found.unmet == pytest.approx(wanted, rel=0.03, abs=3e-4)
+
+
+def test_the_loneliest_plane_counts_although_it_is_no_share_of_all():
+    found = tuy(ring_of_cameras(64, axis=0), Target((0, 0, 0), 0.1))
+    assert found.unmet == 0 and not found.satisfied
+    assert found.distance == pytest.approx(0.05)
+    assert found.sentence.startswith("under 0.1% of the planes")
+
+
 def test_a_flat_path_is_blind_along_its_own_normal_however_it_lies():
     turned = ring_of_cameras(40, axis=1) + ring_of_cameras(40, distance=11.0, axis=1)
     found = tuy(turned, Target((0, 0, 0), 4.0))

@@ -14,7 +14,7 @@ from rift_cl.sampling.criteria.crowther import crowther, crowther_views
 from rift_cl.sampling.criteria.limits import CAUSES, Limits, limits
 from rift_cl.sampling.criteria.merit import criterion_of_coverage
 from rift_cl.sampling.criteria.orlov import Orlov, orlov
-from rift_cl.sampling.criteria.tuy import tuy
+from rift_cl.sampling.criteria.tuy import Tuy, tuy
 from rift_cl.sampling.targets.scattered import scattered
 
 Table = tuple[tuple[str, ...], list[tuple[Any, ...]], str]
@@ -76,7 +76,7 @@ def missing(sampled: ViewSet) -> Findings:
     if not sampled.is_flat and all(camera.model != "ortho" for camera in sampled.cameras):
         planes = tuy(sampled.cameras, target)
         figures["tuy"] = {"unmet": planes.unmet, "tolerance": planes.tolerance}
-        sentences.append(_planes(planes.unmet))
+        sentences.append(_planes(planes))
     return Findings(figures, (_holes(found, sampled.unit),), tuple(sentences))
 
 
@@ -100,7 +100,7 @@ def _resolved_by(frequency: float, sampled: ViewSet) -> str:
     """The resolution of the slices in nine tenths of all directions, as part of a sentence."""
     if frequency * sampled.target.diameter < 1:
         return ", and leave more than a tenth of all directions unresolved"
-    return f", and resolve {1 / frequency:.3g} {sampled.units}"
+    return f", and resolve {1 / frequency:.3g} {sampled.units} in nine tenths of all directions"
 
 
 def _holes(found: dict[int, Orlov], unit: str) -> Table:
@@ -136,13 +136,13 @@ def _hole(entry: Orlov) -> str:
     )
 
 
-def _planes(unmet: float) -> str:
+def _planes(found: Tuy) -> str:
     path = "the path through neighbouring cameras"
-    if unmet == 0:
+    if found.satisfied:
         return f"Tuy's condition is met: every plane through the target meets {path}."
     return (
-        f"Tuy's condition is not met: {unmet:.1%} of the planes through the target do not meet "
-        f"{path}."
+        f"Tuy's condition is not met: {found.unmet_in_words} of the planes through the target do "
+        f"not meet {path}."
     )
 
 
@@ -174,8 +174,8 @@ def resolution(sampled: ViewSet, names: tuple[str, ...]) -> Findings:
     sentences = (
         _ended(found, names[0], sampled),
         f"By Crowther's criterion {needed} views evenly spaced on a circle resolve periods of "
-        f"{1 / target.highest:.3g} {units}; {count.views} of these views see the target's "
-        f"centre{_resolved_by(count.frequency, sampled)}.",
+        f"{1 / target.highest:.3g} {units} in all directions; {count.views} of these views see the "
+        f"target's centre{_resolved_by(count.frequency, sampled)}.",
     )
     reached = {"needed": needed, "wanted": target.highest, "frequency": count.frequency}
     record = {"limits": points, "crowther": {"views": count.views, **reached}}

@@ -13,9 +13,14 @@ from rift_cl.commands.analyze.facts import Findings, Table, missing, resolution,
 from rift_cl.commands.analyze.input import open_views
 from rift_cl.commands.analyze.report import analysis_page
 from rift_cl.commands.analyze.settings import AnalyzeSettings
-from rift_cl.commands.analyze.suggestions import angles_to_add, cameras_to_add, usual_distance
+from rift_cl.commands.analyze.suggestions import (
+    angles_to_add,
+    cameras_to_add,
+    kept_near,
+    usual_distance,
+)
 from rift_cl.commands.analyze.surface import surface_missing, surface_resolution
-from rift_cl.commands.inputs.surfaces import sides_of, surface_of
+from rift_cl.commands.inputs.surfaces import ASTRAY, sides_of, surface_of
 from rift_cl.commands.inputs.view_set import Floats, ViewSet, place_of
 from rift_cl.commands.pictures.coverage_pictures import MAP_BYTES
 from rift_cl.commands.pictures.views_table import csv_text, view_row
@@ -50,7 +55,7 @@ class Analysis:
         self.folder = RunFolder.of(settings, "analyze")
         self.metrics: dict[str, Any] = {}
         self.tables: list[Table] = []
-        # Of what is seen through: conclusions, the number of views that it takes among them.
+        # Conclusions, for the console as for the page.
         self.sentences: list[str] = []
         self.added: tuple[Camera, ...] = ()
 
@@ -85,8 +90,7 @@ class Analysis:
         yield Report(2, _STEPS, "steps")
         findings.append(more)
         self.tables = [table for found in findings for table in found.tables]
-        if not sampled.opaque:
-            self.sentences = [text for found in findings for text in found.sentences]
+        self.sentences = [text for found in findings for text in found.sentences]
         self.metrics = {
             "source": str(self.settings.source),
             "views": sampled.views,
@@ -147,14 +151,20 @@ class Analysis:
         if sampled.opaque:
             far = usual_distance(sampled)
             gaps = [sides_of(one, far).gap for one in (more, sampled)]
-            text = (
+            sentences = [
                 f"{start} the side farthest from all views would be {gaps[0]:.3g} degrees from the "
                 f"nearest, instead of {gaps[1]:.3g}."
-            )
+            ]
         else:
-            text = (
+            sentences = [
                 f"{start} the posterior variance would be {self._unknown(more):.3%} of the prior, "
                 f"instead of {self._unknown(sampled):.3%}."
+            ]
+        if kept_near(sampled):
+            sentences.append(
+                f"None is suggested more than about {ASTRAY:.0f} degrees from the views at hand, "
+                "since nothing tells what stands there: for views on all sides, run 'rift fit' and "
+                "analyze its folder."
             )
         names = ("azimuth", "elevation", "distance")
         figures = {
@@ -162,7 +172,7 @@ class Analysis:
             "unknown_with_added": self._unknown(more),
         }
         caption = "The most informative first, each given those before it."
-        return Findings(figures, ((columns, rows, caption),), (text,))
+        return Findings(figures, ((columns, rows, caption),), tuple(sentences))
 
     @staticmethod
     def _unknown(sampled: ViewSet) -> float:

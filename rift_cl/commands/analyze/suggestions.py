@@ -12,6 +12,7 @@ from rift_cl.commands.pictures.views_table import angles_of
 from rift_cl.geometry import Camera
 from rift_cl.geometry.camera_type import CameraType
 from rift_cl.sampling.planning.constraints import Constraints
+from rift_cl.sampling.planning.keep_out import KeepOut
 from rift_cl.sampling.planning.planner import next_views
 from rift_cl.sampling.targets.observations import coarser_focal
 
@@ -39,15 +40,8 @@ def cameras_to_add(sampled: ViewSet, count: int) -> tuple[Camera, ...]:
     angles = np.array([angles_of(camera, center, up) for camera in sampled.cameras])
     low, high = min(0.0, float(angles[:, 1].min())), max(_HIGH, float(angles[:, 1].max()))
     distance = usual_distance(sampled)
-    target, closed = sampled.target, None
-    if sampled.opaque:
-        target = surface_of(sampled, distance)
-        known = sampled.space is not None
-        closed = (
-            hidden_places(sampled, distance, distance)
-            if known
-            else strange_places(sampled, distance)
-        )
+    target = surface_of(sampled, distance) if sampled.opaque else sampled.target
+    closed = _closed(sampled, distance)
     constraints = Constraints(
         elevation=(math.radians(low), math.radians(high)),
         distance=distance,
@@ -58,6 +52,21 @@ def cameras_to_add(sampled: ViewSet, count: int) -> tuple[Camera, ...]:
     alike = camera_type_of(sampled.cameras[int(np.argsort(angles[:, 2])[len(angles) // 2])])
     found = next_views(sampled.cameras, target, count, constraints, (alike,), compare=False)
     return tuple(found.cameras[place] for place in found.order)
+
+
+def kept_near(sampled: ViewSet) -> bool:
+    """Whether places far from the existing cameras are closed, as nothing is known of them."""
+    unknown = sampled.opaque and sampled.space is None
+    return unknown and strange_places(sampled, usual_distance(sampled)) is not None
+
+
+def _closed(sampled: ViewSet, distance: float) -> KeepOut | None:
+    """Where no camera is suggested; None for nowhere."""
+    if not sampled.opaque:
+        return None
+    if sampled.space is None:
+        return strange_places(sampled, distance)
+    return hidden_places(sampled, distance, distance)
 
 
 def usual_distance(sampled: ViewSet) -> float:

@@ -1,7 +1,7 @@
 """Missing sides and resolution limits of views of an opaque target: figures and sentences.
 
-Sentences are of predictors that hold against errors of held-out photographs (``verdicts``); the
-rest are figures in metrics.json.
+Sentences are of what the views did not see, and of predictors that hold against errors of held-out
+photographs (``verdicts``); the rest are figures in metrics.json.
 """
 
 from __future__ import annotations
@@ -41,10 +41,14 @@ def surface_missing(sampled: ViewSet, distance: float) -> Findings:
         {
             "angle": f"The side of the target farthest from all views, {way}, is {sides.gap:.3g} "
             "degrees from the nearest of them.",
-            "sides": f"{sides.unseen:.1%} of the target's sides are seen by no view within "
-            f"{SQUARE:.0f} degrees of their normal, {sides.seen_once:.1%} by only one.",
         }
     )
+    if sides.unseen > 0:
+        # A fact of the views that were taken, not a forecast of errors.
+        sentences.append(
+            f"{sides.unseen:.1%} of the target's sides are seen by no view within {SQUARE:.0f} "
+            "degrees of their normal."
+        )
     if sampled.space is None:
         sentences.append(
             "Occlusion is not known: analyze the folder of a fit, or a COLMAP model with its "

@@ -26,6 +26,8 @@ from rift_cl.sampling.targets.target import Target
 Floats = NDArray[np.float64]
 # Planes through the target: directions, and places along each.
 _NORMALS, _OFFSETS = 1024, 9
+# Smallest share that is printed.
+_LEAST = 1e-3
 # Planes through a point of which it is counted how many were crossed.
 _CROSSED = 1 << 14
 # Distance up to which a plane counts as met, as a share of the target's diameter.
@@ -40,7 +42,7 @@ class Tuy:
     """Which planes through the target do not meet the path through the cameras.
 
     Args:
-        unmet: the share of them.
+        unmet: the share of them, over all normals and all places along the diameter, to some 1e-3.
         normal: (3,) of the plane that is furthest from the path.
         offset: of that plane from the target's middle.
         distance: of that plane from the path.
@@ -55,8 +57,16 @@ class Tuy:
 
     @property
     def satisfied(self) -> bool:
-        """Whether every plane that was tried is met."""
-        return self.unmet == 0
+        """Whether every plane that was tried is met.
+
+        The plane of a ring is tried although it counts for nothing in the share of all planes.
+        """
+        return self.distance <= self.tolerance
+
+    @property
+    def unmet_in_words(self) -> str:
+        """The share in per cent; one that would round to nothing is not printed as nothing."""
+        return f"{self.unmet:.1%}" if self.unmet >= _LEAST else f"under {_LEAST:.1%}"
 
     @property
     def sentence(self) -> str:
@@ -65,7 +75,7 @@ class Tuy:
             return "Every plane through the target meets the path through neighbouring cameras."
         x, y, z = self.normal + 0.0
         return (
-            f"{self.unmet:.1%} of the planes through the target do not meet the path through "
+            f"{self.unmet_in_words} of the planes through the target do not meet the path through "
             f"neighbouring cameras; the loneliest, across ({x:.2f}, {y:.2f}, {z:.2f}), is "
             f"{self.distance:.3g} away from it."
         )
@@ -92,7 +102,8 @@ def tuy(cameras: Sequence[Camera], target: Target, *, tolerance: float | None = 
     near = _NEAR * target.diameter if tolerance is None else one_number(tolerance)
     if not near > 0:
         raise InputError(f"tolerance is {tolerance!r}, wanted a positive length")
-    # A flat path is blind along its own normal, which no even set of directions hits.
+    # A flat path is blind along its own normal, which no even set of directions hits. It may be
+    # the loneliest, but stands for no share of all directions.
     spread = places - places.mean(0)
     own = np.linalg.eigh(spread.T @ spread)[1].T
     normals = np.concatenate([half_sphere(_NORMALS), own])
@@ -105,7 +116,10 @@ def tuy(cameras: Sequence[Camera], target: Target, *, tolerance: float | None = 
         beyond = np.maximum(low - offsets[:, None], offsets[:, None] - high)
         distances[part] = np.maximum(beyond, 0).min(2)
     worst = np.unravel_index(int(np.argmax(distances)), distances.shape)
-    unmet = float((distances > near).mean())
+    # The planes that touch the ball, where a path is furthest, stand for half a step each.
+    share = np.ones(_OFFSETS)
+    share[[0, -1]] = 0.5
+    unmet = float(np.average((distances[:_NORMALS] > near).mean(0), weights=share))
     offset = float(offsets[worst[1]])
     return Tuy(unmet, normals[worst[0]], offset, float(distances[worst]), near)
 

@@ -112,26 +112,52 @@ def _stations(lens: _Lens, angles: Floats) -> ViewTable:
     return ViewTable(np.full(len(angles), lens.kind), table)
 
 
-def _along(design: DesignSpace, lens: _Lens, angles: Floats, ends: bool) -> ViewTable | None:
-    """Views evenly along a curve, or along what keep-outs leave of it; at its ends or inside."""
+def _along(
+    design: DesignSpace,
+    lens: _Lens,
+    described: str,
+    angles: Floats,
+    *,
+    ends: bool,
+    closed: bool = False,
+) -> list[tuple[str, ViewTable]]:
+    """Views evenly along a curve, at its ends or inside; none where there is no place for them.
+
+    Free views stand along what keep-outs leave of the curve, and its name says that it has a gap.
+    Views on a path are even over the whole of it: a gap would make it another path.
+
+    Args:
+        design: where views may stand.
+        lens: of all views.
+        described: the curve's name.
+        angles: (n, 2) azimuth and elevation of points evenly along it.
+        ends: whether the first and the last view stand at its ends.
+        closed: whether it ends where it began, so that views may begin anywhere.
+    """
     laid = _stations(lens, angles)
-    clear = np.flatnonzero(allowed(design, laid))
-    if not len(clear):
-        return None
+    clear = allowed(design, laid)
+    free = isinstance(design.constraints.path, Free)
+    kept = np.flatnonzero(clear) if free else np.arange(len(clear))
+    if not len(kept):
+        return []
     share = np.linspace(0, 1, lens.views) if ends else (np.arange(lens.views) + 0.5) / lens.views
-    places = np.minimum((share * len(clear)).astype(int), len(clear) - 1)
-    return laid.take(clear[places])
+    places = kept[np.minimum((share * len(kept)).astype(int), len(kept) - 1)]
+    name = described if len(kept) == len(clear) else f"{described} with a gap"
+    for begin in range(math.ceil(len(clear) / lens.views) if closed and not free else 1):
+        stands = (places + begin) % len(clear)
+        if clear[stands].all():
+            return [(name, laid.take(stands))]
+    return []
 
 
 def _rings(design: DesignSpace, lens: _Lens) -> list[tuple[str, ViewTable]]:
-    first, last = design.constraints.azimuth
-    found = []
+    (first, last), closed = design.constraints.azimuth, design.constraints.full_circle
+    found: list[tuple[str, ViewTable]] = []
     for elevation in _levels(design.constraints.elevation, _RINGS):
-        turn = np.linspace(first, last, _LAID, endpoint=not design.constraints.full_circle)
+        turn = np.linspace(first, last, _LAID, endpoint=not closed)
         angles = np.column_stack([turn, np.full(_LAID, elevation)])
-        view_table = _along(design, lens, angles, not design.constraints.full_circle)
-        if view_table is not None:
-            found.append((f"a ring at {math.degrees(elevation):.0f} degrees", view_table))
+        described = f"a ring at {math.degrees(elevation):.0f} degrees"
+        found += _along(design, lens, described, angles, ends=not closed, closed=closed)
     return found
 
 
@@ -142,28 +168,27 @@ def _arcs(design: DesignSpace, lens: _Lens) -> list[tuple[str, ViewTable]]:
     corners = list(
         itertools.product((first, last), _levels(design.constraints.elevation, _ENDS))
     ) + list(itertools.product(((first + last) / 2,), _levels(design.constraints.elevation, 2)))
-    found = []
+    found: list[tuple[str, ViewTable]] = []
     for start, end in itertools.combinations(corners, 2):
         if math.dist(start, end) < 1e-6:
             continue
         share = np.linspace(0, 1, _LAID)[:, None]
         angles = np.array(start) * (1 - share) + np.array(end) * share
         a, b = (tuple(round(math.degrees(x)) for x in corner) for corner in (start, end))
+        described = f"an arc from azimuth, elevation {a} to {b} degrees"
         # Half a turn ends on the line where it began: there views stand half a step inside.
         for ends in (True, False):
-            view_table = _along(design, lens, angles, ends)
-            if view_table is not None:
-                found.append((f"an arc from azimuth, elevation {a} to {b} degrees", view_table))
+            found += _along(design, lens, described, angles, ends=ends)
     return found
 
 
 def _zigzags(design: DesignSpace, lens: _Lens) -> list[tuple[str, ViewTable]]:
-    found = []
-    for described, angles in edge_ways(design.constraints):
-        view_table = _along(design, lens, angles, ends=not design.constraints.full_circle)
-        if view_table is not None:
-            found.append((described, view_table))
-    return found
+    ends = not design.constraints.full_circle
+    return [
+        option
+        for described, angles in edge_ways(design.constraints)
+        for option in _along(design, lens, described, angles, ends=ends)
+    ]
 
 
 def _quantiles(design: DesignSpace, lens: _Lens) -> list[tuple[str, ViewTable]]:
