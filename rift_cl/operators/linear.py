@@ -212,6 +212,10 @@ class LinearOperator(ABC):
 
         return Sum(self, other) if isinstance(other, LinearOperator) else NotImplemented
 
+    def __radd__(self, other: object) -> LinearOperator:
+        """The operator itself for 0 + A, with which ``sum([A, B])`` begins."""
+        return self if isinstance(other, int) and other == 0 else NotImplemented
+
     def __sub__(self, other: LinearOperator) -> LinearOperator:
         """The operator x -> A x - B x."""
         return self + (-other) if isinstance(other, LinearOperator) else NotImplemented
