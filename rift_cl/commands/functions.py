@@ -39,7 +39,7 @@ from rift_cl.commands.run_folder.saved_settings import (
     parsed_settings,
     saved_settings,
 )
-from rift_cl.errors import InputError
+from rift_cl.errors import InputError, WrongTypeError
 from rift_cl.progress import Report
 
 PathLike = str | os.PathLike[str]
@@ -381,6 +381,10 @@ def _plain(value: Any) -> Any:
 
 def _run(job: Any, progress: Progress) -> None:
     with released(job):
+        if not (isinstance(progress, bool) or progress is None or callable(progress)):
+            raise WrongTypeError(
+                f"progress is {progress!r}, wanted True, or a function that takes each Report"
+            )
         if isinstance(progress, bool) or progress is None:
             show_progress(job.run(), quiet=not progress)
             return
