@@ -48,6 +48,14 @@ class DeviceArray(Protocol):
     def context(self) -> Any:
         """The ``pyopencl.Context`` that it lives in."""
 
+    @property
+    def queue(self) -> Any:
+        """The ``pyopencl.CommandQueue`` that works on it, or None."""
+
+    @property
+    def events(self) -> list[Any]:
+        """Each ``pyopencl.Event`` that pyopencl's own arithmetic on it waits for."""
+
     def __len__(self) -> int:
         """Its length along the first axis."""
 

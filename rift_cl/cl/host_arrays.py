@@ -247,7 +247,9 @@ def as_device_array(
     dtype: DTypeLike = np.float32,
     inside: bool = False,
 ) -> DeviceArray:
-    """Check a device array that a caller handed in.
+    """Check a device array that a caller handed in, and wait for it where it is another queue's.
+
+    What another queue is to do with it afterwards has to wait too: ``finish_for_others``.
 
     Args:
         device: that it has to be on.
@@ -276,7 +278,7 @@ def as_device_array(
 
 
 def _check_whole(device: Device, array: DeviceArray, *, name: str, inside: bool = False) -> None:
-    """Kernels and copies see buffers, and know nothing of views into them."""
+    """Kernels and copies see buffers, and know nothing of views into them or of other queues."""
     # A copy of an output would be written in its place.
     own = "give an array of its own"
     if not array.flags.c_contiguous:
@@ -288,6 +290,35 @@ def _check_whole(device: Device, array: DeviceArray, *, name: str, inside: bool 
         raise ShapeError(f"{name} is a view that begins inside another device array: {remedy}")
     if array.context != device.context:
         raise DeviceError(f"{name} lives on another device than {device.name}: copy it over first")
+    _wait_for_others(device, array)
+
+
+def _wait_for_others(device: Device, array: DeviceArray) -> None:
+    """Wait for what another queue than the device's own still does to an array.
+
+    An event of the array tells of pyopencl's arithmetic alone: its queue knows the rest.
+    """
+    own = device.queue
+    if array.queue is own and not array.events:
+        return
+    with named_errors("finishing the work of another queue", device.name):
+        if array.queue is not None and array.queue != own:
+            array.queue.finish()
+        # With its queue taken away or replaced (``with_queue``) it keeps its events.
+        for event in array.events:
+            if event.command_queue != own:
+                event.wait()
+
+
+def finish_for_others(device: Device, *arrays: DeviceArray | None) -> None:
+    """Wait for all work if one of these arrays is another queue's, which knows nothing of it.
+
+    It may then read what was written to the array, and write what was read from it. Arrays of the
+    device's own queue cost nothing.
+    """
+    own = device.queue
+    if any(array is not None and array.queue != own for array in arrays):
+        device.finish()
 
 
 def is_device_array(value: object) -> TypeGuard[DeviceArray]:

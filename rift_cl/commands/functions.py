@@ -44,7 +44,7 @@ from rift_cl.commands.run_folder.saved_settings import (
     parsed_settings,
     saved_settings,
 )
-from rift_cl.errors import InputError, StoppedError
+from rift_cl.errors import InputError, StoppedError, WrongTypeError
 from rift_cl.progress import Report
 
 PathLike = str | os.PathLike[str]
@@ -395,10 +395,15 @@ def _run(job: Any, progress: Progress) -> None:
 
     Raises:
         StoppedError: it was broken off.
+        WrongTypeError: the progress is nothing that a report can be given to.
     """
     stop = getattr(job, "stop", None)
     heeded = nullcontext() if stop is None else gentle_interrupt(stop, plain_interrupt())
     with released(job), heeded:
+        if not (isinstance(progress, bool) or progress is None or callable(progress)):
+            raise WrongTypeError(
+                f"progress is {progress!r}, wanted True, or a function that takes each Report"
+            )
         reports = job.run()
         if isinstance(progress, bool) or progress is None:
             show_progress(reports, quiet=not progress)

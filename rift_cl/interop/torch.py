@@ -25,6 +25,7 @@ from rift_cl.interop.splat_functions import Drawer, Project, Shade
 from rift_cl.interop.tensors import check_tensor
 from rift_cl.splat.renderer import DepthKind, check_depth
 from rift_cl.splat.settings import SplatSettings
+from rift_cl.splat.splats import check_opacities, check_scales
 
 __all__ = ["Screens", "project", "rasterize", "render", "shade"]
 
@@ -141,6 +142,19 @@ def rasterize(
     return images, alphas
 
 
+def _check_stored(
+    scales: torch.Tensor | None, opacities: torch.Tensor, settings: SplatSettings
+) -> None:
+    """Refuse scales and opacities in the form that files hold, which would draw nothing."""
+    if not len(opacities):
+        return
+    if scales is not None:
+        check_scales(float(scales.detach().amin()))
+    if settings.mode == "light" and settings.activation == "clamp":
+        least, most = torch.aminmax(opacities.detach())
+        check_opacities(float(least), float(most))
+
+
 def render(
     means: torch.Tensor,
     quats: torch.Tensor | None,
@@ -164,9 +178,10 @@ def render(
     Args:
         means: (N, 3) positions; all tensors are float32 and on one device of torch's.
         quats: (N, 4) rotations (w, x, y, z); None with ``covars``.
-        scales: (N, 3) standard deviations, all above 0, or a splat is not drawn and gets no
-            gradient; None with ``covars``.
-        opacities: (N,) opacities, or densities in xray mode.
+        scales: (N, 3) standard deviations, not their logarithms; a splat with a scale of 0 is not
+            drawn and gets no gradient; None with ``covars``.
+        opacities: (N,) opacities, 0 to 1 and not their logits, or densities in xray mode and
+            optical depths with the activations ``exp`` and ``square``.
         viewmats: (V, 4, 4) world-to-camera matrices.
         Ks: (V, 3, 3) intrinsics in pixels.
         size: (height, width) of the images.
@@ -188,6 +203,7 @@ def render(
     how = drawer(size, model=model, settings=settings, device=device)
     check_depth(depth, how.settings)
     screens = project(how, means, quats, scales, opacities, viewmats, Ks, covars=covars)
+    _check_stored(scales, opacities, how.settings)
     views, count = screens.culled.shape
     parts = []
     if sh is not None:

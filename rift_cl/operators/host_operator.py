@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from operator import index
 from typing import Any
 
 import numpy as np
@@ -17,7 +18,7 @@ from rift_cl.cl.device import Device
 from rift_cl.cl.discovery import default_device
 from rift_cl.cl.elementwise import copy
 from rift_cl.cl.host_arrays import as_host_array, download, upload
-from rift_cl.errors import DTypeError, InputError
+from rift_cl.errors import DTypeError, InputError, ShapeError
 from rift_cl.operators.linear import LinearOperator, Shape
 
 # In what NumPy says to who writes into an array that may only be read.
@@ -40,7 +41,8 @@ class HostOperator(LinearOperator):
 
     Raises:
         DTypeError: ``dtype`` is complex.
-        ShapeError: a function gave another shape, when it was applied.
+        ShapeError: ``domain`` or ``range`` is no shape, or a function gave another shape, when it
+            was applied.
         InputError: a function wrote into its argument, when it was applied.
     """
 
@@ -57,7 +59,8 @@ class HostOperator(LinearOperator):
         if np.dtype(dtype).kind == "c":
             raise DTypeError(f"the operator is of type {np.dtype(dtype)}, wanted a real one")
         real = np.float64 if np.dtype(dtype) == np.float64 else np.float32
-        super().__init__(domain, range, device or default_device(), real)
+        shapes = (_shape("domain", domain), _shape("range", range))
+        super().__init__(*shapes, device or default_device(), real)
         self._forward, self._backward = forward, adjoint
 
     def __reduce__(self) -> tuple[Any, ...]:
@@ -97,6 +100,16 @@ class HostOperator(LinearOperator):
         if found.shape == (math.prod(shape),):
             found = found.reshape(shape)
         return as_host_array(found, shape, name="result", wants="the operator", dtype=self.dtype)
+
+
+def _shape(name: str, given: Any) -> Shape:
+    try:
+        shape = tuple(map(index, given))
+    except TypeError as error:
+        raise ShapeError(
+            f"HostOperator: {name} is {given!r}, wanted a shape, such as (8,) or (64, 64)"
+        ) from error
+    return shape
 
 
 def _remade(

@@ -35,6 +35,7 @@ from rift_cl.cl.host_arrays import (
     check_apart,
     check_output,
     download,
+    finish_for_others,
     is_device_array,
     is_jax_array,
     is_tensor,
@@ -152,6 +153,8 @@ class LinearOperator(ABC):
             out: where to put the result, of the same kind as ``x`` and with memory of its own; a
                 new array if not given. Not for torch and JAX. Device arrays that begin inside
                 another's buffer, such as ``stack[1]``, cost a copy on the device, as ``x`` too.
+                With a device array of another queue than ``device.queue``, as ``x`` or ``out``,
+                the call waits for that queue before, and for its own work after.
             name: the caller's name for ``x``, for error messages.
 
         Returns:
@@ -173,10 +176,12 @@ class LinearOperator(ABC):
             if out is not None:
                 out = allowed(out, self.range, name="out")
                 check_apart(x, out, name=name)
-            x = with_own_buffer(self.device, x)
             y = self.device.empty(self.range, self.dtype) if out is None or out.offset else out
-            self._fill(x, y)
-            return y if out is None or y is out else put_inside(self.device, y, out)
+            self._fill(with_own_buffer(self.device, x), y)
+            if out is not None and y is not out:
+                put_inside(self.device, y, out)
+            finish_for_others(self.device, x, out)
+            return y if out is None else out
         host = as_host_array(x, self.domain, name=name, wants="the operator", dtype=self.dtype)
         y = _empty(self.range, self.dtype) if out is None else out
         y = check_output(y, self.range, self.dtype)
@@ -206,6 +211,10 @@ class LinearOperator(ABC):
         from rift_cl.operators.algebra import Sum
 
         return Sum(self, other) if isinstance(other, LinearOperator) else NotImplemented
+
+    def __radd__(self, other: object) -> LinearOperator:
+        """The operator itself for 0 + A, with which ``sum([A, B])`` begins."""
+        return self if isinstance(other, int) and other == 0 else NotImplemented
 
     def __sub__(self, other: LinearOperator) -> LinearOperator:
         """The operator x -> A x - B x."""

@@ -38,7 +38,8 @@ class Splats:
         quats: (N, 4) rotations as quaternions (w, x, y, z) of any length; None with ``covars``.
         scales: (N, 3) standard deviations along the rotated axes, all above 0, or a splat is not
             drawn; None with ``covars``.
-        opacities: (N,) opacities, 0 to 1; densities at the peak, per length, in xray mode.
+        opacities: (N,) opacities, 0 to 1; densities at the peak, per length, in xray mode. What
+            they are belongs to the settings they are drawn with, so that they are not checked here.
         colors: (N, D) features, or None.
         sh: (N, K, 3) coefficients of spherical harmonics, K = 1, 4, 9, 16 or 25, or None.
         covars: (N, 6) upper triangles xx, xy, xz, yy, yz, zz of covariance matrices, in place
@@ -137,8 +138,9 @@ class Splats:
         Raises:
             ShapeError: an array does not fit the others.
             DTypeError: an array does not hold real numbers.
-            InputError: a covariance is not symmetric, a splat's shape is given twice or not at
-                all, covariances have modes, or a number of modes belongs to no order.
+            InputError: a scale is negative, as a logarithm is, a covariance is not symmetric, a
+                splat's shape is given twice or not at all, covariances have modes, or a number of
+                modes belongs to no order.
             ResourceLimitError: they do not fit the device's memory budget.
         """
         hosts = {"means": means, "quats": quats, "scales": scales, "opacities": opacities}
@@ -152,11 +154,38 @@ class Splats:
                 if name == "covars" and array.shape[1:] == (3, 3):
                     array = _upper_triangles(array)
                 ready[name] = as_plain(array, np.float32)
+        if scales is not None:
+            check_scales(float(np.fmin.reduce(ready["scales"], axis=None, initial=0)))
         # Arrays that do not fit are refused before anything is allocated.
         count = len(cls(**ready))
         need = sum(host.nbytes for host in ready.values() if host is not None)
         plan_chunks(1, need, 0, device.budget, what=f"scene of {count} splats")
         return cls(**{name: _sent(device, host) for name, host in ready.items()})
+
+
+def check_scales(least: float) -> None:
+    """Refuse the logarithms of scales, which files of splats hold.
+
+    Raises:
+        InputError: the least scale is negative.
+    """
+    if least < 0:
+        raise InputError(
+            f"scales go down to {least:.3g}, wanted lengths: of their logarithms take exp(scales)"
+        )
+
+
+def check_opacities(least: float, most: float) -> None:
+    """Refuse the logits of opacities, which files of splats hold.
+
+    Raises:
+        InputError: an opacity is below 0 or above 1.
+    """
+    if least < 0 or most > 1:
+        raise InputError(
+            f"opacities go from {least:.3g} to {most:.3g}, wanted 0 to 1: of their logits take "
+            "sigmoid(opacities), 1 / (1 + exp(-opacities))"
+        )
 
 
 def _sent(device: Device, host: NDArray[np.float32] | None) -> Any:

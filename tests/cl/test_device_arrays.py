@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 import numpy as np
+import pyopencl as cl
 import pytest
+from pyopencl.array import to_device
 
 import rift_cl as rift
 from rift_cl.cl import Device
@@ -12,6 +16,7 @@ from rift_cl.cl.host_arrays import as_device_array, fetch, is_device_array
 from rift_cl.errors import DeviceError, DTypeError, ShapeError
 
 SHAPE = (4, 6)
+VALUES = np.arange(24, dtype=np.float32).reshape(SHAPE)
 
 
 def _checked(device, array):
@@ -56,6 +61,93 @@ def test_array_of_another_context(device):
         _checked(device, array)
     with pytest.raises(DeviceError, match="another device"):
         device.get(array)
+
+
+class _HeldQueue(cl.CommandQueue):
+    """A queue of a user's own, which stands still until it is finished.
+
+    ``late`` is an array that holds zeros until then, and VALUES once the queue went on.
+    """
+
+    held = None
+
+    def hold(self):
+        self.late, values = to_device(self, np.zeros_like(VALUES)), to_device(self, VALUES)
+        self.held = cl.UserEvent(self.context)
+        cl.enqueue_barrier(self, wait_for=[self.held])
+        cl.enqueue_copy(self, self.late.base_data, values.base_data)
+
+    def finish(self):
+        if self.held is not None:
+            self.held.set_status(cl.command_execution_status.COMPLETE)
+            self.held = None
+        super().finish()
+
+
+class _Event:
+    """An event of a held queue, which goes on when it is waited for."""
+
+    def __init__(self, queue):
+        self.command_queue = queue
+
+    def wait(self):
+        self.command_queue.finish()
+
+
+@pytest.fixture
+def held(device):
+    queue = _HeldQueue(device.context)
+    queue.hold()
+    yield queue
+    queue.finish()
+
+
+def _projector(device):
+    return rift.Projector(rift.Grid(SHAPE), rift.Parallel([0.0], 8), device=device)
+
+
+@pytest.mark.parametrize("take", ["apply", "get", "solve"])
+def test_array_of_another_queue_is_waited_for(device, held, take):
+    A, late = _projector(device), held.late
+    if take == "apply":
+        np.testing.assert_array_equal(device.get(A(late)), A(VALUES))
+    elif take == "get":
+        np.testing.assert_array_equal(device.get(late), VALUES)
+    else:
+        image = rift.cgls(A, device.array(A(VALUES)), steps=0, start=late)
+        np.testing.assert_array_equal(device.get(image), VALUES)
+
+
+@pytest.mark.parametrize("replaced", [False, True])
+def test_array_whose_queue_was_taken_away_or_replaced_is_waited_for(device, held, replaced):
+    A = _projector(device)
+    moved = held.late.with_queue(device.queue if replaced else None)
+    moved.add_event(_Event(held))
+    np.testing.assert_array_equal(device.get(A(moved)), A(VALUES))
+
+
+def test_arrays_without_a_queue(device):
+    A = _projector(device)
+    x, out = device.array(VALUES).with_queue(None), device.zeros(A.range).with_queue(None)
+    assert A(x, out) is out
+    np.testing.assert_array_equal(device.get(out), A(VALUES))
+
+
+@pytest.mark.parametrize("solve", [False, True])
+def test_output_on_another_queue_is_written_when_the_call_returns(device, monkeypatch, solve):
+    A = _projector(device)
+    x = device.array(VALUES)
+    call = partial(rift.cgls, A, A(x), steps=0, start=x) if solve else partial(A, x)
+    wanted = device.get(call())
+    out = to_device(cl.CommandQueue(device.context), np.zeros_like(wanted))
+    done = []
+    finish = Device.finish
+    monkeypatch.setattr(Device, "finish", lambda self: done.append(finish(self)))
+    own = device.zeros(wanted.shape)
+    call(out=own)
+    assert not done  # The device's own queue needs no wait.
+    assert call(out=out) is out and done
+    np.testing.assert_array_equal(out.get(), wanted)
 
 
 def test_operator_refuses_what_the_check_refuses(device):

@@ -11,7 +11,7 @@ import pytest
 
 import rift_cl as rift
 from rift_cl.commands.cli import main
-from rift_cl.errors import InputError, StoppedError
+from rift_cl.errors import InputError, StoppedError, WrongTypeError
 
 SMALL = {"steps": 20, "splats": 100, "hold_out": 4}
 
@@ -103,6 +103,12 @@ def test_an_axis_is_shown_by_its_curve():
     scan = rift.Parallel(angles, 48, center=22.5)
     found = rift.find_center(rift.phantom.shepp_logan_sinogram(grid, scan), angles)
     assert "data:image/svg+xml" in found._repr_html_()
+
+
+def test_progress_that_cannot_be_called_is_refused(fitted, tmp_path):
+    with pytest.raises(WrongTypeError, match="progress is 5"):
+        rift.render(fitted, tmp_path / "film", progress=5)
+    assert not (tmp_path / "film").exists()
 
 
 def test_a_failed_command_leaves_no_folder(tmp_path, monkeypatch, capsys):

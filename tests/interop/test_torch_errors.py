@@ -26,6 +26,10 @@ BAD = {
     "pose": ({"views": lambda t: t * float("nan")}, NonFiniteError, "view"),
     "mirror": ({"views": lambda t: -t}, InputError, "view"),
     "singular": ({"Ks": lambda t: 0 * t}, InputError, "focal lengths"),
+    "logarithms": ({"scales": lambda t: t.log()}, InputError, r"scales go down to.*exp"),
+    "negative": ({"scales": lambda t: -t}, InputError, r"scales go down to.*exp"),
+    "logits": ({"opacities": lambda t: t.logit()}, InputError, r"opacities go from.*sigmoid"),
+    "above 1": ({"opacities": lambda t: t + 1}, InputError, r"opacities go from.*sigmoid"),
     "lenses": ({"Ks": lambda t: t[:1]}, ShapeError, r"Ks has shape \(1, 3, 3\)"),
 }
 
@@ -68,3 +72,14 @@ def test_whole_numbers_of_any_type_are_a_size(device):
     tensors, (views, Ks) = tensors_of(scene()), map(torch.tensor, cameras())
     images = [render(tensors, views, Ks, size=size, device=device)[0] for size in SIZES]
     assert all(torch.equal(image, images[0]) for image in images[1:])
+
+
+@pytest.mark.parametrize(
+    "settings", [SplatSettings(mode="xray"), SplatSettings(activation="exp"), SplatSettings()]
+)
+def test_opacities_that_are_densities_or_depths_may_be_above_1(device, settings):
+    tensors, (views, Ks) = tensors_of(scene()), map(torch.tensor, cameras())
+    free = settings != SplatSettings()
+    tensors["opacities"] = tensors["opacities"] * 0 + (3 if free else 1)
+    images, _ = render(tensors, views, Ks, settings=settings, device=device)
+    assert images.abs().max() > 0

@@ -368,6 +368,13 @@ def test_operators_on_two_devices_are_refused(A, device):
             combine()
 
 
+def test_a_sum_begins_with_zero(A):
+    assert np.array_equal(sum([A, 2 * A])(X), (A + 2 * A)(X))
+    assert 0 + A is A
+    with pytest.raises(TypeError):
+        1 + A
+
+
 @pytest.mark.parametrize("other", [1, "A", None, [1.0]])
 def test_what_is_no_operator_cannot_be_added(A, other):
     with pytest.raises(TypeError):
@@ -458,6 +465,12 @@ def test_a_function_of_an_operator_cannot_overwrite_what_it_is_applied_to(device
         with pytest.raises(InputError, match=r"writes into its argument.*copy"):
             B(given)
     assert (x == 1).all()
+
+
+def test_a_host_operator_wants_shapes(device):
+    for shapes, name in (((8, (8,)), "domain is 8"), (((8,), (8, 1.5)), "range is")):
+        with pytest.raises(ShapeError, match=name):
+            rift.HostOperator(np.array, np.array, *shapes, device=device)
 
 
 def test_a_result_that_the_host_has_no_memory_for_is_refused():

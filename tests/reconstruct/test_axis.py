@@ -273,6 +273,14 @@ def test_what_does_not_tell_the_axis_is_refused(case):
         rift.find_center(y, angles)
 
 
+def test_a_scan_is_taken_for_its_angles():
+    y = _sinogram(ANGLES["half turn"], 64.3)
+    scan = rift.Parallel(ANGLES["half turn"], 128, pitch=0.2)
+    assert find_center(y, scan).center == find_center(y, scan.angles).center
+    with pytest.raises(rift.RiftError, match="sinogram has shape"):
+        find_center(y[:, 1:], scan)
+
+
 def test_another_shape_is_told():
     with pytest.raises(rift.RiftError, match="angle, row, bin"):
         rift.find_center(np.ones(5, np.float32), np.zeros(5))

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
-from projection_scenes import KINDS, Kind, arrays_of, camera_of, changed, plain, projected_on
+from projection_scenes import KINDS, Kind, arrays_of, camera_of, changed, plain, projected_on, sent
 
 from rift_cl.splat.projection import project
 from rift_cl.splat.settings import SplatSettings
@@ -94,7 +94,7 @@ def test_hostile_numbers_are_culled_or_drawn_whole(device, name, odd):
     }  # fmt: skip
     if kind.covars:
         values = {"means": odd[:, :3], "covars": odd[:, 3:9], "opacities": odd[:, 10]}
-    splats = Splats.upload(device, **values)
+    splats = sent(device, values)
     projected = project(device, splats, kind.camera, kind.settings)
     found = {name: device.get(array) for name, array in arrays_of(projected).items()}
     codes = found["culled"]

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from projection_scenes import LENS, Kind, arrays_of, random_splats, shaped, turned
+from projection_scenes import LENS, Kind, arrays_of, random_splats, sent, shaped, turned
 
 import rift_cl as rift
 from rift_cl.errors import DeviceError, DTypeError, InputError, ShapeError
@@ -120,7 +120,7 @@ def scenes(*names):
 def run(device, chosen, scene, values):
     """A frame and its gradient: host arrays of both, and how many were culled."""
     renderer = Renderer(replace(chosen.settings, **scene.changes), device=device)
-    splats, background = Splats.upload(device, **values), device.array(chosen.background)
+    splats, background = sent(device, values), device.array(chosen.background)
     camera = scene.camera(chosen.model, chosen.aperture)
     frame = renderer.forward(splats, camera, background=background, depth=chosen.depth)
     random = np.random.default_rng(scene.seed)

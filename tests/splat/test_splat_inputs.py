@@ -37,6 +37,18 @@ def test_splats_beyond_the_budget_are_refused_before_any_is_sent(device):
     assert len(Splats.upload(roomy, **values)) == 20_000
 
 
+def test_logarithms_of_scales_are_refused(device):
+    values = random_splats(5)
+    with pytest.raises(InputError, match=r"scales go down to -2\.3.*exp"):
+        Splats.upload(device, **values | {"scales": np.full((5, 3), np.log(0.1))})
+    one = values["scales"].copy()
+    one[:2, 1] = np.nan, -1
+    with pytest.raises(InputError, match=r"scales go down to -1"):
+        Splats.upload(device, **values | {"scales": one})
+    one[1] = 0
+    assert len(Splats.upload(device, **values | {"scales": one})) == 5
+
+
 @pytest.mark.parametrize(
     ("changes", "words"),
     [

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from rift_cl.errors import InputError
+from rift_cl.errors import InputError, NonFiniteError
 from rift_cl.geometry import Camera
 from rift_cl.train.start.points import (
     far_points,
@@ -155,3 +155,12 @@ def test_points_in_one_place_and_one_point():
     assert start_splats(np.zeros((1, 3)), None, seed=0)["log_scales"].tolist() == [[0, 0, 0]]
     with pytest.raises(InputError, match="no points"):
         start_splats(np.zeros((0, 3)), None, seed=0)
+
+
+def test_points_and_colours_that_are_no_numbers_are_named():
+    broken = np.eye(3)
+    broken[1, 2] = np.nan
+    with pytest.raises(NonFiniteError, match="points"):
+        start_splats(broken)
+    with pytest.raises(NonFiniteError, match="colors"):
+        start_splats(np.eye(3), broken)

@@ -18,7 +18,7 @@ Floats = NDArray[np.float64]
 
 def find_center(
     sinogram: NDArray[np.float32],
-    angles: Floats | Fan | Cone,
+    angles: Floats | Parallel | Fan | Cone,
     *,
     span: tuple[float, float] | None = None,
     device: Device | None = None,
@@ -34,8 +34,8 @@ def find_center(
         sinogram: line integrals, (angle, bin) or (angle, row, bin); of a stack, at most five rows
             are looked at, evenly chosen; of a cone those near the row ``center[0]``, as they are
             or averaged in at most five groups.
-        angles: directions in radians, in any order; or the scan, ``Fan`` or ``Cone``, whose
-            centre (bin) and sense need not be right.
+        angles: directions in radians, in any order; or the scan, ``Parallel``, ``Fan``
+            or ``Cone``, whose centre (bin) and sense need not be right.
         span: where to search, in bins; for half turns the middle 60 % of the detector if not
             given, for full turns all of it but the outermost bins.
         device: accepted as by every method; the search runs on the host.
@@ -46,8 +46,10 @@ def find_center(
     Raises:
         InputError: the data do not tell the axis: no contrast, too few views, a wide gap between
             them, or nothing that stands out of the noise. Also: the span is not on the detector,
-            or the scan is another one than a ``Fan`` or a circular ``Cone``.
-        ShapeError: the sinogram has not two or three axes, or not a view for each angle.
+            or the scan is another one than a ``Parallel``, a ``Fan`` or a circular
+            ``Cone``.
+        ShapeError: the sinogram has not two or three axes, or not a view for each angle,
+            or not the bins of the scan.
         NonFiniteError: a sample is not finite.
     """
     shape = np.shape(sinogram)
@@ -57,8 +59,10 @@ def find_center(
         )
     if isinstance(angles, Fan | Cone | Vectors):
         return axis_of_scan(sinogram, angles, span)
-    directions = Parallel(angles, shape[-1]).angles
-    y = as_host_array(sinogram, (directions.size, *shape[1:]), name="sinogram", wants="find_center")
+    scan = angles if isinstance(angles, Parallel) else Parallel(angles, shape[-1])
+    directions = scan.angles
+    wanted = (directions.size, *shape[1:-1], scan.bins)
+    y = as_host_array(sinogram, wanted, name="sinogram", wants="find_center")
     stack = y if y.ndim == 3 else y[:, None]
     rows = searched_rows(stack.shape[1])
     return axis_of_rows((stack[:, row] for row in rows), rows, stack.shape[1], directions, span)

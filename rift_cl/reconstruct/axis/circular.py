@@ -90,7 +90,8 @@ def orbit_rows(scan: Cone) -> list[NDArray[np.intp]]:
     if not 0 <= orbit <= scan.rows - 1:
         raise InputError(
             f"Cone: center is {scan.center}, its row off the detector of {scan.rows} rows; "
-            "opposite rays are compared near the orbit's row: give the axis yourself (--center)"
+            "opposite rays are compared near the orbit's row: give the axis yourself "
+            "(--center, or the scan's center in Python)"
         )
     widest = float(np.abs(np.sin(scan.fan_angles()[[0, -1]])).max())
     reach = max(_PARTED / (2 * widest), 0.5)

@@ -25,7 +25,10 @@ from rift_cl.reconstruct.axis.views import Views, is_cut, without_rings
 Floats = NDArray[np.float64]
 
 # How a refusal ends.
-GIVE_IT = "; give it yourself (--center), by the slices that 'rift center' shows"
+GIVE_IT = (
+    "; give it yourself (--center, or the scan's center in Python), by the slices that "
+    "'rift center' shows"
+)
 # A search needs some detail, and views from several directions.
 _FEWEST_BINS, _FEWEST_VIEWS = 8, 4
 # Most rows that are looked at.

@@ -114,7 +114,7 @@ def attenuation(
         row = first_row + int(np.flatnonzero(dead.all(axis=1))[0])
         raise InputError(
             f"flats are no brighter than darks anywhere in row {row}: are the two swapped, or "
-            "is this row outside the beam (choose rows with --rows)?"
+            "is this row outside the beam (choose others, by --rows on a command line)?"
         )
     beam[dead] = 1
     transmission: Floats = projections - dark
@@ -263,7 +263,7 @@ def _fill(lines: Floats, unknown: NDArray[np.bool_], row: int) -> None:
     if lost.all():
         raise InputError(
             f"row {row} holds no sample with a signal above the darks: choose other rows "
-            "(--rows), or check which frames are darks (--darks)"
+            "(--rows on a command line), or check which frames are darks (--darks)"
         )
     for view in np.flatnonzero(unknown.any(axis=1) & ~lost):
         gaps = unknown[view]

@@ -21,7 +21,13 @@ from numpy.typing import NDArray
 
 from rift_cl.cl.arithmetic import axpby
 from rift_cl.cl.elementwise import copy
-from rift_cl.cl.host_arrays import as_device_array, check_output, download, is_device_array
+from rift_cl.cl.host_arrays import (
+    as_device_array,
+    check_output,
+    download,
+    finish_for_others,
+    is_device_array,
+)
 from rift_cl.errors import CheckpointError, InputError
 from rift_cl.geometry.numbers import one_number
 from rift_cl.progress import Report
@@ -203,6 +209,8 @@ def solve(solver: Solver, steps: int, *, like: Any, out: Any = None) -> Any:
     if out is None:
         return solver.image
     copy(data.device, solver.image, out)
+    if not here:
+        finish_for_others(data.device, out)
     return out
 
 

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
+from rift_cl.cl.host_arrays import check_finite
 from rift_cl.errors import InputError
 from rift_cl.geometry import Camera
 
@@ -300,10 +301,14 @@ def start_splats(
 
     Raises:
         InputError: there are no points.
+        NonFiniteError: a point or a colour holds NaN or infinity.
     """
     count = len(points)
     if count == 0:
         raise InputError("there are no points to begin with, wanted one or more")
+    check_finite(np.asarray(points), name="points")
+    if colors is not None:
+        check_finite(np.asarray(colors), name="colors")
     random = np.random.default_rng((seed, 0xC0105))
     if colors is None:
         colors = random.uniform(0.3, 0.7, (count, 3))
