@@ -165,7 +165,8 @@ class SplatScene:
 
         Raises:
             InputError: there is no such file.
-            FileFormatError: the file is damaged, or holds no splats.
+            FileFormatError: the file is damaged, or holds no splats, or places in more digits than
+                float32 has, so that splats would be moved by more than a tenth of their width.
             NonFiniteError: more than half of the splats cannot be drawn, or the light holds NaN.
             ResourceLimitError: the splats are larger than the budget; nothing was allocated.
         """
