@@ -415,7 +415,8 @@ def _plan(settings: Any, output: Output) -> None:
     print_table(*worth_table(job.metrics), caption=caption_of(job.metrics))
     print(job.verdict)
     more = "" if job.vectors is None else ", vectors.txt"
-    print(f"transforms.json, views.csv{more} and report.html are in {settings.out}")
+    unit = f" (one unit is {job.file_unit:g} mm)" if job.file_unit != 1 else ""
+    print(f"transforms.json{unit}, views.csv{more} and report.html are in {settings.out}")
 
 
 def _sweep(settings: Any, output: Output) -> None:

@@ -69,7 +69,7 @@ def test_no_camera_is_suggested_behind_a_wall_that_sparse_points_show(walled, tm
     words = ["analyze", str(walled), "--out", str(out), "--diameter", "1.2", "--add", "3"]
     assert main([*words, "--quiet"]) == 0
     rows = list(csv.DictReader((out / "views.csv").read_text().splitlines()))
-    assert min(float(row["x"]) + WALL for row in rows) > 0 and len(rows) == 3
+    assert min(float(row["x, units"]) + WALL for row in rows) > 0 and len(rows) == 3
     found, page = metrics_of(out), (out / "report.html").read_text()
     assert found["mode"] == "surface" and 0.2 < found["shut_sides"] < 0.6
     assert found["unknown_with_added"] < found["unknown"]
@@ -163,7 +163,7 @@ def test_views_besides_those_that_were_taken_keep_off_the_wall(walled, tmp_path)
     words = ["plan", "--have", str(walled), "--views", "4", "--unit", "100", "--diameter", "120"]
     assert main([*words, "--distance", "380", "450", "--out", str(out), "--quiet"]) == 0
     rows = csv.DictReader((out / "views.csv").read_text().splitlines())
-    assert min(float(row["x"]) for row in rows) > -100 * WALL
+    assert min(float(row["x, mm"]) for row in rows) > -100 * WALL
 
 
 def test_a_scan_has_no_surface(scan, tmp_path, capsys):

@@ -97,6 +97,15 @@ def test_far_splats_of_spz_are_told_of_on_a_dry_run(here, capsys):
         assert ("1 of 200 splats" in said) == (farthest == 1e6)
 
 
+def test_a_scale_that_spz_cannot_hold_is_refused_also_on_a_dry_run(here, arrays, capsys):
+    SplatScene(**arrays).save(here / "ball.ply")
+    for more in ((), ("--dry-run",)):
+        assert export("ball.ply", "--to", "spz", "--scale", 1e5, *more) == 3
+        said = " ".join(capsys.readouterr().err.split())
+        assert "20 of 20 splats are made narrower" in said and "--scale" in said
+    assert [entry.name for entry in here.iterdir()] == ["ball.ply"]
+
+
 def test_spz_says_whether_splats_are_antialiased(here, arrays, capsys):
     for antialiased in (False, True):
         SplatScene(**arrays, antialiased=antialiased).save(here / "ball.ply")

@@ -169,6 +169,30 @@ def test_a_scene_of_photographs_becomes_a_mesh(ball, capsys):
     assert np.median(away) == pytest.approx(1, abs=0.08)
 
 
+def test_a_mesh_of_flat_splats_lies_before_their_surface_by_a_third_of_their_width(ball):
+    """Where splats overlap, those whose centres are nearer to the camera cover the others."""
+    count, width = 750, 0.1
+    z = 1 - 2 * (np.arange(count) + 0.5) / count
+    turn = np.pi * (3 - np.sqrt(5)) * np.arange(count)
+    x, y = (np.sqrt(1 - z**2) * f(turn) for f in (np.cos, np.sin))
+    SplatScene(
+        MIDDLE + np.stack([x, y, z], axis=1),
+        np.tile(np.log([width, width, 0.003]), (count, 1)),
+        # The least turns that take z to the directions.
+        np.stack([1 + z, -y, x, 0 * z], axis=1),
+        np.full(count, 5.0),
+        np.zeros((count, 1, 3)),
+    ).save("flat.ply")
+    views = transforms_of(cameras(16, (120, 140)), [f"{k}.png" for k in range(16)])
+    write_json(ball / "transforms.json", views)
+    words = ["--capture", str(ball), "--voxels", "48", "--to", "obj", "--quiet"]
+    assert main(["export", "flat.ply", "--mesh", "--out", "flat.obj", *words]) == 0
+    lines = (ball / "flat.obj").read_text().splitlines()
+    vertices = np.array([line.split()[1:4] for line in lines if line.startswith("v ")], float)
+    away = np.linalg.norm(vertices - MIDDLE, axis=1)
+    assert np.median(away) == pytest.approx(1.035, abs=0.005)
+
+
 def test_a_grid_without_room_is_refused_before_it_is_made(ball, monkeypatch, capsys):
     monkeypatch.setattr(fused_depth, "host_budget", lambda: 1000)
     words = ["--capture", str(ball / "transforms.json"), "--voxels", "24", "--to", "obj"]

@@ -86,9 +86,9 @@ def test_its_lens_is_in_the_file_and_in_the_table_for_the_tripod(planned):
                               ("azimuth", "elevation"))  # fmt: skip
         way = [math.cos(azimuth) * math.cos(elevation), math.sin(azimuth) * math.cos(elevation),
                math.sin(elevation)]  # fmt: skip
-        place = np.array([0, 0, 5]) + float(row["distance"]) * np.array(way)
+        place = np.array([0, 0, 5]) + float(row["distance, mm"]) * np.array(way)
         np.testing.assert_allclose(place, np.array(frame["transform_matrix"])[:3, 3], atol=0.01)
-        assert row["f-number"] == "8" and float(row["focus"]) > 0
+        assert row["f-number"] == "8" and float(row["focus, mm"]) > 0
 
 
 def test_the_report_compares_and_says_what_planning_is_worth(planned, capsys):
@@ -150,9 +150,19 @@ def test_further_views_are_planned_besides_those_that_were_taken(tmp_path, capsy
     assert plan(tmp_path / "more", *have, "--diameter", 100) == 0
     found = metrics_of(tmp_path / "more")
     assert (found["views"], found["taken_before"]) == (2, 6)
-    assert len(json.loads((tmp_path / "more" / "transforms.json").read_text())["frames"]) == 2
+    record = json.loads((tmp_path / "more" / "transforms.json").read_text())
+    assert len(record["frames"]) == 2 and record["millimetres_per_unit"] == 100
+    # Its lengths are in the capture's unit, those of the table in millimetres.
+    rows = list(csv.DictReader((tmp_path / "more" / "views.csv").read_text().splitlines()))
+    for row, frame in zip(rows, record["frames"], strict=True):
+        place = np.array([float(row[f"{axis}, mm"]) for axis in "xyz"])
+        np.testing.assert_allclose(
+            100 * np.array(frame["transform_matrix"])[:3, 3], place, rtol=1e-5, atol=1e-3
+        )
+        assert frame["focal_length"] == float(row["focal length, mm"])
+    said = capsys.readouterr()
+    assert "one unit is 100 mm" in " ".join(said.out.split()) and "--diameter" not in said.err
     np.testing.assert_allclose(found["target"]["center"], [30, -20, 10], atol=1e-4)
-    assert "--diameter" not in capsys.readouterr().err
     # Without a unit it is said how large one makes the place.
     assert plan(tmp_path / "other", *have[:2], "--views", 1, "--dry-run") == 0
     assert "is taken to be 1 mm" in capsys.readouterr().out

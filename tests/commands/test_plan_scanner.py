@@ -68,7 +68,7 @@ def test_views_on_the_orbit_fill_the_widest_gap(on_orbit):
         behind = (azimuth + 90) % 180
         assert 112 < behind < 180
         assert float(view["elevation, degrees"]) == pytest.approx(0, abs=1e-6)
-        assert float(view["distance"]) == pytest.approx(R)
+        assert float(view["distance, mm"]) == pytest.approx(R)
         assert view["camera"] == "the scanner"
 
 

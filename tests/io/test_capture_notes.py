@@ -13,6 +13,7 @@ from PIL import Image, ImageCms
 from view_files import store
 
 from rift_cl.io import open_capture
+from rift_cl.io.captures.capture_notes import range_notes
 from rift_cl.io.images.read_picture import read_picture_header
 
 
@@ -130,6 +131,37 @@ def test_a_capture_tells_of_a_colour_profile_once(tmp_path: Path) -> None:
     found = note(path)
     assert found.startswith("a.png ") and "'Display P3'" in found and "sRGB" in found
     assert open_capture(path, photographs=False).notes == ()
+
+
+@pytest.mark.parametrize(("suffix", "kind"), [("tif", "float"), ("tif", "uint16"), ("exr", "half")])
+def test_floating_tiffs_are_told_to_be_linear_light(tmp_path: Path, suffix: str, kind: str) -> None:
+    """Others of floating-point numbers are so by custom, and whole numbers never."""
+    notes = open_capture(stored(tmp_path, suffix, kind, 0.5)).notes
+    assert len(notes) == (kind == "float")
+    assert not notes or (notes[0].startswith("a.tif ") and "linear light" in notes[0])
+
+
+def test_numbers_beyond_black_and_white_are_counted_in_the_light_of_the_fit(tmp_path: Path) -> None:
+    views = open_capture(stored(tmp_path, "exr", "float", 0.5, 4.0, -0.2)).views
+    for light, least, most in (("linear", -0.2, 4), ("display", -2.58, 1.82)):
+        (found,) = range_notes(views, downscale=1, light=light)
+        assert found.startswith("25 % of the numbers")
+        assert f"in {light} light, from {least:.3g} to {most:.3g}:" in found
+    for kind, suffix in (("float", "exr"), ("uint16", "tif")):
+        inside = open_capture(stored(tmp_path, suffix, kind, 1.0)).views
+        assert range_notes(inside, downscale=1, light="display") == []
+
+
+def stored(folder: Path, suffix: str, kind: str, *levels: float) -> Path:
+    """A capture of grey pictures of another format: the first level, and one row of each other."""
+    path = made.transforms(folder)
+    pixels = np.full((made.HEIGHT, made.WIDTH, 3), levels[0], np.float32)
+    for row, level in enumerate(levels[1:]):
+        pixels[row] = level
+    for name in made.NAMES:
+        store((folder / "images" / name).with_suffix(f".{suffix}"), pixels, kind)
+    path.write_text(path.read_text().replace(".png", f".{suffix}").replace(".jpg", f".{suffix}"))
+    return path
 
 
 def with_chunk(path: Path, kind: bytes, content: bytes) -> Path:

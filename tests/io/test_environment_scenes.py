@@ -160,6 +160,18 @@ def test_pictures_of_another_shape_are_refused(tmp_path):
         read_environment_map(tmp_path / "none.png", 16, display=True)
 
 
+def test_negative_light_is_refused_but_for_what_filters_leave(tmp_path):
+    for level, refused in ((-1.0, True), (-0.02, True), (-0.001, False)):
+        light = np.full((8, 16, 3), level, np.float32)
+        light[:4] = 0 if level == -1 else 1
+        write_pixels(tmp_path / "a.exr", light, format="openexr", attributes={})
+        if refused:
+            with pytest.raises(InputError, match="negative light"):
+                read_environment_map(tmp_path / "a.exr", 16, display=True)
+        else:
+            assert np.isfinite(read_environment_map(tmp_path / "a.exr", 16, display=True)).all()
+
+
 def directions_of(count, seed=4):
     found = np.random.default_rng(seed).normal(size=(count, 3))
     return found / np.linalg.norm(found, axis=1, keepdims=True)

@@ -12,7 +12,7 @@ from rift_cl.errors import InputError
 from rift_cl.io.scenes.formats import palettes
 from rift_cl.io.scenes.formats.formats import FORMATS
 from rift_cl.io.scenes.formats.plain import along_curve, unit_quats
-from rift_cl.io.scenes.formats.spz import encode_spz, fraction_bits, place_notes
+from rift_cl.io.scenes.formats.spz import encode_spz, fraction_bits, place_notes, scene_notes
 from rift_cl.io.scenes.splat_activations import opacities_of, scales_of
 from rift_cl.io.scenes.splat_scene import SplatScene, XrayScene
 
@@ -223,3 +223,57 @@ def test_a_scene_far_from_its_origin_is_rounded_and_told_of() -> None:
     assert fraction_bits(away) == 6
     (note,) = place_notes(away)
     assert "rounded by up to 0.0078 units" in note and "from the origin" in note
+
+
+def with_scales(log_scales: list[list[float]]) -> SplatScene:
+    """Opaque splats a unit apart, whose standard deviations have these logarithms."""
+    count = len(log_scales)
+    return SplatScene(
+        means=np.column_stack([np.arange(count), np.zeros((count, 2))]),
+        log_scales=log_scales,
+        quats=np.tile([1.0, 0, 0, 0], (count, 1)),
+        logit_opacities=np.full(count, 5.0),
+        sh=np.zeros((count, 4, 3)),
+    )
+
+
+def scaled_by(given: SplatScene, factor: float) -> SplatScene:
+    log_scales = given.log_scales + np.float32(np.log(factor))
+    return dataclasses.replace(given, means=given.means * factor, log_scales=log_scales)
+
+
+def test_spz_refuses_a_scene_that_its_scales_would_make_another() -> None:
+    """And the factor that it names does fit."""
+    given = with_scales([[-4.0, 0, 0]] * 5 + [[-3.0, -3, -2]] * 20)
+    assert not scene_notes(given)
+    for factor, words, better in ((1000, "narrower", 0.1), (1e-4, "thicker", 1e3)):
+        lost = scaled_by(given, factor)
+        for made in (encode_spz, scene_notes):
+            with pytest.raises(InputError, match=f"{words}.*lengths {better:g} times"):
+                made(lost)
+        assert not scene_notes(scaled_by(given, factor * better))
+
+
+def test_spz_tells_of_few_scales_that_it_clips_and_not_of_those_that_nobody_sees() -> None:
+    wide = scaled_by(with_scales([[-4.0, -3, 0]] + [[-4.0, -2, -2]] * 24), 500)
+    (note,) = scene_notes(wide)
+    assert note.startswith("1 of 25 splats") and "by up to 1.32 times" in note
+    # A flat splat without thickness looks the same with one of a hundredth of a pixel.
+    flat = with_scales([[-80.0, -3, -3]] * 25)
+    assert not scene_notes(flat) and encode_spz(flat)
+    (note,) = scene_notes(scaled_by(flat, 0.01))
+    assert note.startswith("25 of 25 splats") and "thicker" in note
+
+
+def test_spz_tells_of_colours_and_harmonics_that_it_clips() -> None:
+    given = with_scales([[-3.0, -3, -3]] * 25)
+    for number, (inside, outside) in enumerate([(3.34, 3.6), (1.01, 1.25)]):
+        sh = given.sh.copy()
+        sh[0, number, 1], sh[1:4, number, 2] = inside, -inside
+        held = dataclasses.replace(given, sh=sh)
+        assert not scene_notes(held)
+        sh = sh.copy()
+        sh[2:5, number, 0] = -outside
+        (note,) = scene_notes(dataclasses.replace(given, sh=sh))
+        assert note.startswith("3 of 25 splats") and f"up to {outside}" in note
+        assert ("above the first" in note) == bool(number)

@@ -14,7 +14,7 @@ from splat_files import KINDS, valid
 
 import rift_cl as rift
 from rift_cl.errors import FileFormatError, NonFiniteError, ResourceLimitError, RiftError
-from rift_cl.io.scenes.splat_activations import opacities_of
+from rift_cl.io.scenes.splat_activations import log_scales_of, opacities_of
 
 
 def grown() -> int:
@@ -211,6 +211,16 @@ def test_splats_that_cannot_be_drawn_are_counted_and_left_out(tmp_path: Path) ->
     values["f_rest_4"], values["nx"] = 0, np.nan
     made.write(path, ("vertex", values))
     assert len(rift.SplatScene.load(path)) == 7
+
+
+def test_scales_of_zero_are_flat_splats(tmp_path: Path) -> None:
+    """As the logarithm of 0 has them: all splats are read, with what a scale of 0 is drawn as."""
+    values = made.records(made.scene(7, 1))
+    values["scale_2"] = -np.inf
+    scene = rift.SplatScene.load(made.write(tmp_path / "a.ply", ("vertex", values)))
+    assert len(scene) == 7
+    np.testing.assert_array_equal(scene.log_scales[:, 2], log_scales_of(np.zeros(7, np.float32)))
+    np.testing.assert_array_equal(scene.log_scales[:, 0], values["scale_0"])
 
 
 @pytest.mark.parametrize(

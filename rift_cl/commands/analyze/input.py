@@ -201,12 +201,13 @@ def in_millimetres(sampled: ViewSet, unit: float) -> ViewSet:
         points=target.points * unit,
         band=band,
     )
-    cameras = tuple(_scaled(camera, unit) for camera in sampled.cameras)
+    cameras = tuple(scaled_camera(camera, unit) for camera in sampled.cameras)
     space = None if sampled.space is None else sampled.space.scaled(unit)
     return replace(sampled, target=scaled, cameras=cameras, unit="mm", space=space)
 
 
-def _scaled(camera: Camera, unit: float) -> Camera:
+def scaled_camera(camera: Camera, unit: float) -> Camera:
+    """The same camera where every length is multiplied by a factor."""
     view, K = camera.view.copy(), camera.K.copy()
     view[:3, 3] *= unit
     if camera.model == "ortho":

@@ -191,7 +191,8 @@ class Analysis:
         self.folder.mark()
         self.folder.drop("views.csv")
         if self.added:
-            write_text(self.settings.out / "views.csv", csv_text(self._rows(self.added)))
+            text = csv_text(self._rows(self.added), self.sampled.units)
+            write_text(self.settings.out / "views.csv", text)
 
 
 def _observed(sampled: ViewSet) -> tuple[ViewSet, dict[str, Floats]]:

@@ -65,7 +65,7 @@ class AnalyzeOutput:
 
     out: Path = Path("rift-analyze")
     """Folder for report.html, config.json and metrics.json, and of captures views.csv, the views to
-    add."""
+    add, whose lengths are in millimetres with --unit and in world units without."""
 
 
 @dataclass(frozen=True)

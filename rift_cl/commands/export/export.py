@@ -79,9 +79,12 @@ class Export:
                 "changes with the direction is lost (other formats keep it; a fit with "
                 "--sh-degree 0 has nothing to lose by it)"
             )
-        places = (settings.scale * (self.plain.means @ self.turn.T)).astype(np.float32)
-        self.notes += self.format.place_notes(places)
+        self.notes += self.format.notes(self._written())
         self.notes += self._blur_notes()
+
+    def _written(self) -> SplatScene:
+        """The splats as the format is given them."""
+        return scaled(turned(self.plain, self.turn), self.settings.scale)
 
     def _blur_notes(self) -> list[str]:
         """What viewers make of splats on the screen that the fit did not."""
@@ -137,7 +140,7 @@ class Export:
         """Do it; a report at the end."""
         for note in self.notes:
             self.announce(note)
-        content = self.format.encode(scaled(turned(self.plain, self.turn), self.settings.scale))
+        content = self.format.encode(self._written())
         write_whole(self.path, content)
         self.result = f"{self.path}, {format_bytes(len(content))}"
         yield Report(len(self.plain), len(self.plain), "splats")

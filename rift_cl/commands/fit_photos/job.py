@@ -56,6 +56,7 @@ from rift_cl.io.captures.capture import (
     camera_at,
     capture_name,
 )
+from rift_cl.io.captures.capture_notes import range_notes
 from rift_cl.io.images.environment_map import write_environment_map
 from rift_cl.io.scenes.scene_drawing import SceneDrawing
 from rift_cl.io.scenes.splat_scene import SplatScene
@@ -380,6 +381,9 @@ class Fit(FitRun[FitPhotosSettings]):
         )
         decided = self.checkpoints.decided.get("downscale")
         self.downscale = decided or fitting_downscale(self.training_views, self.device)
+        self.capture_notes += tuple(
+            range_notes(self.training_views, downscale=self.downscale, light=settings.light)
+        )
 
     def _check_sizes(self) -> None:
         """Make sure that SSIM can be had of all photographs that it is asked of."""

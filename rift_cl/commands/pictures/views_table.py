@@ -13,9 +13,10 @@ from rift_cl.commands.inputs.view_set import Floats
 from rift_cl.geometry import Camera
 from rift_cl.report.plot.camera_plot import upright_frame
 
-COLUMNS = (
-    "picture", "azimuth, degrees", "elevation, degrees", "distance", "focus", "camera",
-    "focal length", "f-number", "exposure", "x", "y", "z",
+# {} stands for the unit of lengths; those of lenses are millimetres whatever the scene's are.
+_COLUMNS = (
+    "picture", "azimuth, degrees", "elevation, degrees", "distance, {}", "focus, {}", "camera",
+    "focal length, mm", "f-number", "exposure", "x, {}", "y, {}", "z, {}",
 )  # fmt: skip
 _DIGITS = 6
 
@@ -38,7 +39,7 @@ def view_row(
     up: Floats,
     lens: tuple[str, float | None, float | None, float | None] = ("", None, None, None),
 ) -> tuple[object, ...]:
-    """One row under ``COLUMNS``.
+    """One row of ``csv_text``.
 
     Args:
         name: of the picture.
@@ -51,11 +52,16 @@ def view_row(
     return (name, *angles_of(camera, center, up), focus, *lens, *camera.center.tolist())
 
 
-def csv_text(rows: Sequence[Sequence[object]]) -> str:
-    """The rows under their headings; numbers with six digits that count, empty where unknown."""
+def csv_text(rows: Sequence[Sequence[object]], units: str) -> str:
+    """The rows under their headings; numbers with six digits that count, empty where unknown.
+
+    Args:
+        rows: as ``view_row`` makes them.
+        units: of their lengths, such as "mm".
+    """
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(COLUMNS)
+    writer.writerow(name.format(units) for name in _COLUMNS)
     for row in rows:
         writer.writerow(_cell(cell) for cell in row)
     return text.getvalue()

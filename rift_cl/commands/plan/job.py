@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from rift_cl.cl.budget import format_bytes
+from rift_cl.commands.analyze.input import scaled_camera
 from rift_cl.commands.inputs.view_set import ViewSet, place_of
 from rift_cl.commands.pictures.views_table import csv_text, view_row
 from rift_cl.commands.plan.input import plan_input
@@ -22,6 +23,7 @@ from rift_cl.commands.plan.scanner import (
 from rift_cl.commands.plan.settings import PlanSettings
 from rift_cl.commands.run_folder.run_folder import RunFolder
 from rift_cl.geometry import Vectors
+from rift_cl.io.captures.capture import holds_capture
 from rift_cl.io.captures.transforms_record import transforms_of
 from rift_cl.io.output import write_json, write_text
 from rift_cl.progress import Report
@@ -51,6 +53,9 @@ class Planning:
         self.given = plan_input(settings)
         # Cameras that cannot have the target in their picture are refused here, before any work.
         DesignSpace(self.given.target, self.given.constraints, self.given.types)
+        # Millimetres per unit of transforms.json: a capture's own, so that its frames can be added.
+        of_capture = settings.have is not None and holds_capture(settings.have)
+        self.file_unit = settings.unit if of_capture else 1.0
         self.device = settings.open_device()
         self.folder = RunFolder.of(settings, "plan")
         self.metrics: dict[str, Any] = {}
@@ -183,7 +188,9 @@ class Planning:
             }
             for kind in types
         ]
-        write_json(out / "transforms.json", transforms_of(cameras, names, fields))
+        own = [scaled_camera(camera, 1 / self.file_unit) for camera in cameras]
+        record = {"millimetres_per_unit": self.file_unit, **transforms_of(own, names, fields)}
+        write_json(out / "transforms.json", record)
         center, up = self.given.target.center, np.array(self.given.constraints.up)
         rows = [
             view_row(
@@ -195,6 +202,6 @@ class Planning:
             )
             for name, camera, kind in zip(names, cameras, types, strict=True)
         ]
-        write_text(out / "views.csv", csv_text(rows))
+        write_text(out / "views.csv", csv_text(rows, "mm"))
         if self.vectors is not None:
             write_text(out / "vectors.txt", vectors_text(self.vectors))

@@ -136,9 +136,11 @@ class PlanOutput:
     group: ClassVar[str] = "output"
 
     out: Path = Path("rift-plan")
-    """Folder for transforms.json, views.csv, report.html, config.json and metrics.json; for a
-    cone-beam scan also vectors.txt, a line per view in ASTRA's order (source, detector centre, step
-    between bins, step between rows), in millimetres."""
+    """Folder for transforms.json (lengths in the unit of the capture that --have names, so that its
+    frames can be added to the capture's, and otherwise in millimetres), views.csv (in millimetres),
+    report.html, config.json and metrics.json; for a cone-beam scan also vectors.txt, a line per
+    view in ASTRA's order (source, detector centre, step between bins, step between rows), in
+    millimetres."""
 
 
 @dataclass(frozen=True)

@@ -11,17 +11,24 @@ from collections.abc import Sequence
 from contextlib import suppress
 from pathlib import Path
 
+import numpy as np
+from numpy.typing import NDArray
+
 from rift_cl.errors import RiftError
 from rift_cl.io.captures.capture_paths import MASK_FOLDERS, CaptureFolder, masks_named
 from rift_cl.io.captures.photograph_folder import photograph_names
 from rift_cl.io.captures.view import View
+from rift_cl.io.captures.view_image import read_view
+from rift_cl.io.images.display_light import LightKind
 from rift_cl.io.images.picture_header import PictureHeader
 from rift_cl.io.images.read_picture import read_picture_header
 
 # What lies beside the training file of NeRF's synthetic scenes.
 _SCORED = ("transforms_val.json", "transforms_test.json")
-# Photographs whose headers are read for their colours.
-_LOOKED_AT = 8
+# Photographs whose headers are read for their colours, and whose numbers are for their range.
+_LOOKED_AT, _READ = 8, 2
+# Suffixes of a format that other programs also write display light in, as floating-point numbers.
+_TIFF = (".tif", ".tiff")
 
 
 def part_notes(file: Path) -> list[str]:
@@ -85,14 +92,46 @@ def mask_notes(images: CaptureFolder, views: Sequence[View]) -> list[str]:
 
 def color_notes(views: Sequence[View]) -> list[str]:
     """What is made of colours that are not sRGB's, by the headers of a few photographs."""
-    notes: dict[str, str] = {}
-    for view in views[:: max(1, len(views) // _LOOKED_AT)]:
+    notes: dict[tuple[str, bool], str] = {}
+    for view in _some(views):
         # Whoever reads the photograph is told what is wrong with it.
         with suppress(RiftError):
             header = read_picture_header(view.image)
             if sentence := _color_sentence(view.image, header):
-                notes.setdefault(header.profile, sentence)
+                notes.setdefault((header.profile, header.floating), sentence)
     return list(notes.values())
+
+
+def range_notes(views: Sequence[View], *, downscale: int, light: LightKind) -> list[str]:
+    """A sentence about floating-point photographs that hold less than black or more than white.
+
+    Args:
+        views: those of a capture; the numbers of two photographs are read.
+        downscale: as it is fitted.
+        light: that it is fitted in, "display" or "linear".
+    """
+    numbers = list[NDArray[np.float32]]()
+    for view in _some(views):
+        with suppress(RiftError):
+            if len(numbers) < _READ and read_picture_header(view.image).floating:
+                image = read_view(view, downscale=downscale, light=light)
+                seen = image[..., 3:].all(axis=-1)
+                numbers.append(image[seen, :3].ravel())
+    found = np.concatenate([*numbers, np.empty(0, np.float32)])
+    least, most = float(found.min(initial=0)), float(found.max(initial=0))
+    if least >= 0 and most <= 1:
+        return []
+    share = 100 * np.count_nonzero((found < 0) | (found > 1)) / found.size
+    return [
+        f"{share:.2g} % of the numbers of floating-point photographs lie beyond 0 to 1 in {light} "
+        f"light, from {least:.3g} to {most:.3g}: they are fitted and scored as they are, with 1 as "
+        "the peak of PSNR"
+    ]
+
+
+def _some(views: Sequence[View]) -> Sequence[View]:
+    """A few views, spread over all."""
+    return views[:: max(1, len(views) // _LOOKED_AT)]
 
 
 def _color_sentence(path: Path, header: PictureHeader) -> str:
@@ -103,4 +142,9 @@ def _color_sentence(path: Path, header: PictureHeader) -> str:
         )
     if header.linear and not header.floating:
         return f"{path.name} says that its codes are linear light (gamma 1), and is read so"
+    if header.floating and path.suffix.lower() in _TIFF:
+        return (
+            f"{path.name} holds floating-point numbers, which are taken as linear light: write "
+            "display light (sRGB) as whole numbers of 16 bits"
+        )
     return ""

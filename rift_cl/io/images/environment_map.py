@@ -26,6 +26,8 @@ from rift_cl.io.output import atomic_path
 _ROWS, _MOST_ROWS = 128, 64
 # What lobes may lack of a picture that is theirs, as a share of it, root mean square.
 _EXACT = 0.02
+# How much less than none light may be, as a share of the whole: filters ring by some.
+_LEAST = 0.01
 # Formats whose numbers are linear light.
 _LINEAR = (".exr", ".hdr")
 
@@ -71,7 +73,8 @@ def read_environment_map(
         display: whether the radiance shall be in display light.
 
     Raises:
-        InputError: there is no such file, or its picture has another shape or two channels.
+        InputError: there is no such file, or its picture has another shape or two channels, or its
+            negative numbers add up to more than 1 % of its light; fewer become 0.
         FileFormatError: it is damaged, or no picture.
         NonFiniteError: it holds NaN or infinity.
     """
@@ -103,7 +106,15 @@ def _linear_picture(path: str | os.PathLike[str]) -> NDArray[np.float32]:
             f"{path}: has {rows} rows of {columns} pixels, wanted a picture of all directions, "
             "twice as wide as high"
         )
-    light = np.maximum(np.ascontiguousarray(picture[..., :3], np.float32), 0)
+    light = np.ascontiguousarray(picture[..., :3], np.float32)
+    below = float(-np.minimum(light, 0).sum(dtype=np.float64))
+    light = np.maximum(light, 0)
+    if below > _LEAST * light.sum(dtype=np.float64):
+        raise InputError(
+            f"{path}: holds negative light, which adds up to {below:.3g} for "
+            f"{light.sum(dtype=np.float64):.3g} of the positive: it is no picture of a light, or "
+            "set what is below 0 to 0"
+        )
     if Path(path).suffix.lower() not in _LINEAR:
         to_linear(light)
     return light

@@ -22,7 +22,7 @@ _WIDEST = 64
 
 
 def read_blocks(path: Path, file: BufferedReader, header: PlyHeader) -> Iterator[NDArray[np.void]]:
-    """The records of a file, some at a time; those of a text are float32.
+    """The records of a file, some at a time; those of a text are float64.
 
     A block is the next one's memory: take what is wanted before going on.
 
@@ -53,7 +53,7 @@ def _binary_blocks(
 
 def _text_blocks(path: Path, file: BufferedReader, header: PlyHeader) -> Iterator[NDArray[np.void]]:
     width = len(header.properties)
-    record = np.dtype([(name, "f4") for name in header.properties])
+    record = np.dtype([(name, "f8") for name in header.properties])
     with TextIOWrapper(file, "ascii") as text:
         # A longer line comes in pieces, which have too few numbers and are refused as such.
         pieces = iter(lambda: text.readline(_WIDEST * width), "")
@@ -70,9 +70,9 @@ def _text_blocks(path: Path, file: BufferedReader, header: PlyHeader) -> Iterato
             raise FileFormatError(f"{path}: holds more than the {header.count} records it claims")
 
 
-def _table(path: Path, rows: list[str], start: int, width: int) -> NDArray[np.float32]:
+def _table(path: Path, rows: list[str], start: int, width: int) -> NDArray[np.float64]:
     try:
-        values = np.loadtxt(rows, np.float32, comments=None, ndmin=2)
+        values = np.loadtxt(rows, np.float64, comments=None, ndmin=2)
         fits = values.shape[1] == width
     except ValueError:
         fits = False

@@ -82,6 +82,10 @@ class PlyHeader:
         """The type of a binary record."""
         return np.dtype([(name, self.order + kind) for name, kind in self.properties.items()])
 
+    def floats(self, name: str) -> bool:
+        """Whether float32 holds every number of a property, as the file gives it."""
+        return bool(self.order) and np.can_cast(self.properties[name], np.float32)
+
     def check_size(self, path: Path, size: int) -> None:
         """Compare the claim with the size of the file.
 

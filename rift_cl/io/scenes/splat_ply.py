@@ -26,6 +26,7 @@ from rift_cl.errors import FileFormatError
 from rift_cl.io.boundary import check_claim
 from rift_cl.io.scenes.ply_body import read_blocks, record_runs
 from rift_cl.io.scenes.ply_header import PlyHeader, read_header
+from rift_cl.io.scenes.rounded_places import check_rounding, distances_moved
 from rift_cl.io.scenes.scene_drawing import SceneDrawing, read_drawing
 from rift_cl.io.scenes.splat_basis import SceneBasis, light_comments, read_basis, read_light
 from rift_cl.splat.settings import SplatMode
@@ -50,7 +51,7 @@ def read_ply(
     """Read a scene's kind, basis, drawing and arrays from a file that is open at its beginning.
 
     Raises:
-        FileFormatError: the file is damaged, or holds no splats.
+        FileFormatError: the file is damaged, or holds no splats, or places that float32 cannot.
         ResourceLimitError: they are larger than the budget; nothing was allocated.
     """
     header = read_header(path, file)
@@ -65,19 +66,25 @@ def read_ply(
         )
     coefficients = _coefficients(path, header, mode, basis)
     header.check_size(path, file.seek(0, 2))
-    each = 11 + 3 * coefficients + basis.numbers
+    longer = not all(header.floats(name) for name in "xyz")
+    each = 11 + 3 * coefficients + basis.numbers + longer
     check_claim(path, "the scene", 4 * each * header.count, budget)
     arrays = _empty(header.count, coefficients, basis)
     columns = _columns(arrays, mode, basis)
     if basis.environment:
         arrays["environment"] = read_light(path, header.comments, basis.environment)
+    moved = np.zeros(header.count if longer else 0, np.float32)
     start = 0
     for block in read_blocks(path, file, header):
         # A number too large for float32 becomes infinite, and is left out with the others.
         with np.errstate(over="ignore"):
             for name, column in columns.items():
                 column[start : start + len(block)] = block[name]
+        if longer:
+            part = slice(start, start + len(block))
+            moved[part] = distances_moved(block, arrays["means"][part])
         start += len(block)
+    check_rounding(path, moved, arrays)
     return mode, basis, drawing, arrays
 
 

@@ -24,6 +24,7 @@ from rift_cl.errors import FileFormatError, InputError, OutputError, ShapeError
 from rift_cl.io.boundary import reading
 from rift_cl.io.images.display_light import LightKind
 from rift_cl.io.output import atomic_path, check_space
+from rift_cl.io.scenes.doubted_splats import doubt_activations
 from rift_cl.io.scenes.scene_drawing import SceneDrawing
 from rift_cl.io.scenes.splat_activations import (
     check_range,
@@ -154,7 +155,8 @@ class SplatScene:
         of any scalar type, and with others between them or elements beside them, which are left
         out. The other formats are known by their names; an .spz file is read in its own axes, y
         up. Splats that cannot be drawn, since a number of theirs is NaN or infinite, are left out,
-        and a warning counts them.
+        and a warning counts them. Another warning tells of
+        scales and opacities that seem to be stored as they are.
 
         Args:
             path: the file.
@@ -165,7 +167,8 @@ class SplatScene:
 
         Raises:
             InputError: there is no such file.
-            FileFormatError: the file is damaged, or holds no splats.
+            FileFormatError: the file is damaged, or holds no splats, or places in more digits than
+                float32 has, so that splats would be moved by more than a tenth of their width.
             NonFiniteError: more than half of the splats cannot be drawn, or the light holds NaN.
             ResourceLimitError: the splats are larger than the budget; nothing was allocated.
         """
@@ -175,6 +178,8 @@ class SplatScene:
         if basis.environment:
             check_finite(arrays["environment"], name=f"{path}: environment")
         whole: dict[str, Any] = whole_splats(path, mode, arrays)
+        if mode == "light":
+            doubt_activations(path, whole)
         kind: type[SplatScene] = XrayScene if mode == "xray" else SplatScene
         return kind(**whole, activation=basis.activation, angular=basis.angular, **vars(drawing))
 

@@ -23,6 +23,8 @@ _LARGEST = float(np.finfo(np.float32).max)
 # Values up to which numbers can be drawn with, where that is less than the largest there is: half
 # its logarithm, and its share of up to 36 coefficients times basis functions of up to 7.
 _BOUNDS = {"log_scales": np.log(_LARGEST) / 2, "sh": _LARGEST / 256}
+# What ``log_scales_of`` makes of a scale of 0.
+_FLAT = np.log(np.finfo(np.float32).tiny)
 # What belongs to the scene as a whole.
 _SHARED = ("environment",)
 
@@ -34,11 +36,15 @@ def whole_splats(path: Path, mode: SplatMode, arrays: Arrays) -> Arrays:
         path: the file, for what is said of it.
         mode: what the strengths are. Infinite logits are opacities of 0 and 1, which some programs
             write so; they become the nearest numbers.
-        arrays: the scene's, by their names; (N, ...) but for the environment light.
+        arrays: the scene's, by their names; (N, ...) but for the environment light. Logarithms of
+            scales of minus infinity are those of 0, of flat splats; they become that of the
+            smallest normal number.
 
     Raises:
         NonFiniteError: more than half of the splats cannot be drawn.
     """
+    scales = arrays["log_scales"]
+    scales[np.isneginf(scales)] = _FLAT
     if mode == "light":
         logits = arrays["logit_opacities"]
         np.clip(logits, -_LARGEST, _LARGEST, out=logits)

@@ -5,14 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
-import numpy as np
-from numpy.typing import NDArray
-
 from rift_cl.io.scenes.formats.compressed_ply import encode_compressed_ply
 from rift_cl.io.scenes.formats.gltf import encode_glb
 from rift_cl.io.scenes.formats.plain import check_plain
 from rift_cl.io.scenes.formats.sog import encode_sog
-from rift_cl.io.scenes.formats.spz import encode_spz, place_notes
+from rift_cl.io.scenes.formats.spz import encode_spz, scene_notes
 from rift_cl.io.scenes.splat_ply import encode_ply
 from rift_cl.io.scenes.splat_scene import SplatScene
 
@@ -30,7 +27,7 @@ class SplatFormat:
         upright: whether its files have y up; the others keep the axes of the scene.
         rounds: what of a splat is not kept to the bit.
         antialiased: whether its files can say that splats are antialiased.
-        place_notes: what is to be said of places (N, 3), a sentence each.
+        notes: what is to be said of a scene of plain splats that is to be written, a sentence each.
     """
 
     suffix: str
@@ -38,7 +35,7 @@ class SplatFormat:
     upright: bool
     rounds: str
     antialiased: bool = False
-    place_notes: Callable[[NDArray[np.float32]], list[str]] = lambda means: []
+    notes: Callable[[SplatScene], list[str]] = lambda scene: []
 
 
 def _plain_ply(scene: SplatScene) -> bytes:
@@ -57,7 +54,7 @@ FORMATS = {
         True,
         "everything, harmonics most",
         antialiased=True,
-        place_notes=place_notes,
+        notes=scene_notes,
     ),
     "sog": SplatFormat(".sog", encode_sog, False, "everything, to palettes made for the scene"),
     "glb": SplatFormat(".glb", encode_glb, True, "nothing"),

@@ -10,6 +10,7 @@ farthest splat allows; logarithms of scales, kept from -10 to 5.9, by 1/32; a ro
 by 7e-4; opacities by 1/510; the first harmonic, kept within 3.33, by 0.013; higher ones, kept
 within 1, by 1/64. (The format has levels 1/128 apart; Niantic's own program takes every eighth of
 degree 1 and every sixteenth above, we take every fourth: docs/how-to/export.md says what for.)
+What lies beyond these ends is clipped, and told of or refused (``spz_range``).
 
 A few far splats do not make the places of all others coarse: where the farthest allows no rounding
 as fine as 1e-4 of the scene's size (the median distance from its middle), up to one splat in 100 is
@@ -34,6 +35,7 @@ from rift_cl.io.scenes.formats.plain import (
     smallest_three,
     unit_quats,
 )
+from rift_cl.io.scenes.formats.spz_range import check_scales, range_notes
 from rift_cl.io.scenes.splat_activations import opacities_of
 from rift_cl.io.scenes.splat_scene import SplatScene
 
@@ -58,12 +60,13 @@ def encode_spz(scene: SplatScene) -> bytes:
     """The bytes of a file.
 
     Raises:
-        InputError: the scene is none that the format holds, or too large for its numbers.
+        InputError: the scene is none that the format holds, or too large or small for its numbers.
     """
     check_plain(scene, 3)
     scene = along_curve(scene)
     digits = fraction_bits(scene.means)
     scene = drawn_in(scene, digits)
+    check_scales(scene)
     flags = _ANTIALIASED if scene.antialiased else 0
     header = (_MAGIC, _VERSION, len(scene), scene.degree, digits, flags, 0)
     parts = [
@@ -117,6 +120,17 @@ def drawn_in(scene: SplatScene, digits: int) -> SplatScene:
     return dataclasses.replace(
         scene, means=means.astype(np.float32), log_scales=log_scales.astype(np.float32)
     )
+
+
+def scene_notes(scene: SplatScene) -> list[str]:
+    """What is to be said of a plain scene that will be written: of its places, and what is clipped.
+
+    Raises:
+        InputError: as ``encode_spz`` does.
+    """
+    written = drawn_in(scene, fraction_bits(scene.means))
+    check_scales(written)
+    return [*place_notes(scene.means), *range_notes(written)]
 
 
 def place_notes(means: NDArray[np.float32]) -> list[str]:
