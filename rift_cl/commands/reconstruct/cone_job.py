@@ -222,6 +222,8 @@ class ConeReconstruction:
         """Find the axis, and make the operators again for it."""
         self.source.locate()
         self.inversion.window = self.source.window
+        # The axis decides how large the volume is, where that is not said.
+        self.kept.shape = self.shape
         self.projector, self._formula = self._operators()
         self._check_parts()
         if self._formula is not None and not isinstance(self._formula, Backprojection):
