@@ -415,6 +415,9 @@ class ConeReconstruction:
         scan = self.source.geometry
         if not isinstance(self._formula, FDK) or not isinstance(scan, Cone):
             return
+        # Air that is off zero is no object that goes on.
+        if self.source.air is not None:
+            return
         bin, turn = scan.center[1], is_full_turn(scan.angles)
         further = sees_further(bin, scan.bins)
         if not is_truncated(projections, bin if further and turn else None):
