@@ -69,14 +69,31 @@ def test_a_beam_that_is_weaker_throughout_has_one_level(weaker):
     assert found.levels.mean() == pytest.approx(-np.log(1 - weaker), abs=2e-3)
 
 
+def told_of(lines, noise):
+    """Of 40 scans whose flats have this noise in each bin, how many are told."""
+    told = 0
+    for seed in range(40):
+        # In all views alike.
+        flats = np.random.default_rng(seed).normal(0, noise, lines.shape[1])
+        told += beam_level((lines + flats).astype(np.float32)) is not None
+    return told
+
+
 def test_noise_of_the_flats_hides_no_weak_beam_on_a_small_detector():
     lines = counted(WHOLE[:, np.linspace(0, BINS - 1, 40).round().astype(int)], beam=0.95)
-    found = []
-    for seed in range(40):
-        # Of 0.4 % in each bin, in all views alike.
-        flats = np.random.default_rng(seed).normal(0, 0.004, 40)
-        found.append(beam_level((lines + flats).astype(np.float32)))
-    assert sum(one is not None for one in found) >= 35
+    assert told_of(lines, 0.004) >= 39
+
+
+@pytest.mark.parametrize("flats", [1, 5])
+def test_noise_of_few_flats_hides_no_weak_beam(flats):
+    assert told_of(counted(WHOLE, beam=0.97), (20000 * flats) ** -0.5) >= 39
+
+
+def test_noise_of_few_flats_makes_no_air_of_an_object():
+    """Its fall shows over twice the bins."""
+    wide, core = ellipse(1.5 * HALF, 1.5 * HALF), ellipse(15, 10, 5, 3)
+    lines = counted(core / core.max() + 0.2 * wide / wide.max())
+    assert told_of(lines, (20000 * 5) ** -0.5) <= 4
 
 
 @pytest.mark.parametrize(("fall", "words"), [(0.3, "fell by 30 %"), (-0.2, "rose by 20 %")])

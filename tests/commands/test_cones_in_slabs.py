@@ -153,6 +153,24 @@ def test_a_run_goes_on_with_a_slab_that_a_worker_made(scan, tmp_path, monkeypatc
     assert axes[0]["center"] == axes[1]["center"]
 
 
+def test_slabs_are_as_large_as_the_axis_found_makes_them(tmp_path):
+    """About the detector's middle, which the axis is taken for at first, they are smaller."""
+    angles = 2 * np.pi * np.arange(60) / 60
+    cone = Cone(angles, 20, 28, 2.0, R, S, center=(9.5, 14.6))
+    lines = project([Ellipsoid.ball(6.0, 0.02, (0.5, 1.0, -2.0))], Grid((2, 2, 2)), cone)
+    lengths = {"source_to_axis": R, "source_to_detector": S, "pitch": 2.0}
+    np.savez(tmp_path / "scan.npz", projections=lines, angles=angles, **lengths)
+    given = settings(tmp_path / "scan.npz", tmp_path / "a", kind="attenuation")
+    shape = reconstruction_of(given).shape
+    kept = begin(given)
+    make_slices(replace(given, resume=True), (), kept.mark(), 0, 8)
+    ((_, slab),) = kept.slabs()
+    assert slab.shape[1] > shape[1]
+    volume, _ = made(reconstruction_of(replace(given, resume=True)))
+    alone, _ = made(reconstruction_of(replace(given, out=tmp_path / "b")))
+    assert volume.tobytes() == alone.tobytes()
+
+
 def test_what_cannot_be_cut_is_refused(scan, tmp_path):
     with pytest.raises(InputError, match="fbp or backproject"):
         reconstruction_of(settings(scan, tmp_path / "a", cluster="local:2", method="cgls"))

@@ -227,6 +227,20 @@ def test_an_object_beyond_one_end_alone_is_told_of_that_end(tmp_path: Path) -> N
     assert "lower" not in note
 
 
+@pytest.mark.parametrize("last", [1.0, 3.0])
+def test_air_that_is_off_zero_is_no_object_that_goes_on(
+    ball: Path, tmp_path: Path, last: float
+) -> None:
+    """Neither beyond a side of the detector nor beyond its first and its last row."""
+    with np.load(ball) as made:
+        arrays = dict(made)
+    arrays["projections"] += 0.07 * np.linspace(1, last, VIEWS, dtype=np.float32)[:, None, None]
+    np.savez(tmp_path / "weak.npz", **arrays)
+    given: dict[str, Any] = {"center": CENTER, "kind": "attenuation"}
+    said = " ".join(rift.reconstruct_scan(tmp_path / "weak.npz", tmp_path / "out", **given).notes)
+    assert "--background" in said and "reaches beyond" not in said
+
+
 @pytest.mark.full
 def test_binning_keeps_the_density(ball: Path, tmp_path: Path) -> None:
     found = rift.reconstruct_scan(ball, tmp_path / "a", center=CENTER, binning=2, pixel=1.0)

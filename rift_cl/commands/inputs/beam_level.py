@@ -28,8 +28,11 @@ _OFF, _MOST, _STRONG = 0.01, 0.5, 99.5
 _ALIKE, _FLAT, _LIFT = 0.1, 0.02, 0.3
 # Views over which differences are averaged before they are compared, at least and as a share.
 _BLUR, _BLUR_SHARE = 5, 1 / 20
-# Standard errors from which on a level is no noise.
+# Standard errors from which on a level, or what belies it, is no noise.
 _SURE = 4.0
+# The same of a fall over twice the ends' bins; the ends are part of it where they are at least this
+# share as steep.
+_LIKELY, _AS_STEEP = 3.0, 0.5
 # A level is constant if it varies by less than this share of itself; a line or a step is what it
 # follows if that explains this share of its variance, and a slow change half of it.
 _CONSTANT, _EXPLAINED, _SLOW = 0.2, 0.8, 0.5
@@ -117,14 +120,20 @@ def beam_level(lines: Floats) -> BeamLevel | None:
     count = max(_FEWEST, round(_END * lines.shape[1]))
     if most <= 0 or lines.shape[1] < 4 * count:
         return None
-    # Both from the outermost bin inwards.
-    ends = np.stack([lines[:, :count], lines[:, : -count - 1 : -1]]).astype(np.float64)
+    ends = _inwards(lines, count)
     left, right = ends.mean(axis=2)
     found = BeamLevel(count, (left + right) / 2, _variance(left - right) / 4)
     level = _level(found, ends)
     if not _OFF * most < level <= _MOST * most or not _are_air(ends, level):
         return None
+    if _falls_on(_inwards(lines, 2 * count), level, _bin_variance(ends)):
+        return None
     return found if found.constant or _lifts_all(found, lines) else None
+
+
+def _inwards(lines: Floats, count: int) -> Levels:
+    """So many bins at each end, (2, angle, bin), both from the outermost bin inwards."""
+    return np.stack([lines[:, :count], lines[:, : -count - 1 : -1]]).astype(np.float64)
 
 
 def _are_air(ends: Levels, level: float) -> bool:
@@ -137,17 +146,43 @@ def _are_air(ends: Levels, level: float) -> bool:
     count = ends.shape[2]
     half = count // 2
     falls = ends[:, :, half:].mean(axis=2) - ends[:, :, :half].mean(axis=2)
-    chance = _SURE * _bin_error(ends)
-    if abs(falls.mean()) > _FLAT * level + chance:
+    # Variances, in those of a bin: of a fall at one end, and of the ends' difference.
+    of_fall, of_apart = 1 / half + 1 / (count - half), 2 / count
+    # That of a bin in all views alike, which no mean over views makes less.
+    alike = _bin_variance(ends)
+    if abs(falls.mean()) > _FLAT * level + _SURE * np.sqrt(alike * of_fall / 2):
         return False
     # Noise of a sample, by what bins of one view differ by: views may come in any order.
     noise = float((ends - ends.mean(axis=1, keepdims=True)).var(axis=2, ddof=1).mean())
     apart = ends[0].mean(axis=1) - ends[1].mean(axis=1)
-    of_fall = noise * (1 / half + 1 / (count - half))
-    room = _ALIKE * level + chance
-    return _change(apart, 2 * noise / count) <= room and all(
-        _change(fall, of_fall) <= room for fall in falls
-    )
+
+    def steady(difference: Levels, share: float) -> bool:
+        room = _ALIKE * level + _SURE * np.sqrt(alike * share)
+        return bool(_change(difference, noise * share) <= room)
+
+    return steady(apart, of_apart) and all(steady(fall, of_fall) for fall in falls)
+
+
+def _falls_on(wide: Levels, level: float, alike: float) -> bool:
+    """Whether ends that noise may have made level are part of a fall that goes on beside them.
+
+    An object that reaches beyond the detector is as steep at its ends as beside them. One that
+    begins beside air is steep there alone.
+
+    Args:
+        wide: line integrals of twice the ends' bins, (2, angle, bin), from the outermost inwards.
+        level: root mean square of the views' levels.
+        alike: variance of a bin in all views alike.
+    """
+    bins = wide.mean(axis=(0, 1))
+    count = bins.size // 2
+    half = count // 2
+    fall = bins[count:].mean() - bins[:count].mean()
+    if abs(fall) <= _FLAT * level + _LIKELY * np.sqrt(alike / count):
+        return False
+    # Between means that are count / 2 bins apart, as those of the fall are count.
+    within = bins[half:count].mean() - bins[:half].mean()
+    return bool(within / (fall / 2) > _AS_STEEP)
 
 
 def _lifts_all(found: BeamLevel, lines: Floats) -> bool:
@@ -169,14 +204,15 @@ def _level(found: BeamLevel, ends: Levels) -> float:
     """
     views = found.levels.size
     square = float(np.mean(found.levels**2)) - found.noise
-    by_chance = _SURE * found.noise * np.sqrt(2 / views) + (_SURE * _bin_error(ends)) ** 2
+    alike = _bin_variance(ends) / (2 * ends.shape[2])
+    by_chance = _SURE * found.noise * np.sqrt(2 / views) + _SURE**2 * alike
     # The logarithm of a noisy count is that much too large in the mean.
     shift = float(ends.var(axis=2).mean()) / 2
     return float(np.sqrt(square)) if square > max(by_chance, (2 * shift) ** 2) else 0.0
 
 
-def _bin_error(ends: Levels) -> float:
-    """Standard error of the ends' mean by what differs from bin to bin in all views, as flats do.
+def _bin_variance(ends: Levels) -> float:
+    """Variance of a bin by what differs from bin to bin in all views, as noise of flats does.
 
     A slope that both ends share inwards is an object's, and is left out.
 
@@ -184,7 +220,7 @@ def _bin_error(ends: Levels) -> float:
         ends: line integrals, (2, angle, bin), from the outermost bin inwards.
     """
     rough = np.diff(ends.mean(axis=1), axis=1)
-    return float(np.sqrt(rough.var(ddof=1) / 2 / (2 * ends.shape[2])))
+    return float(rough.var(ddof=1)) / 2
 
 
 def _change(apart: Levels, noise: float) -> float:

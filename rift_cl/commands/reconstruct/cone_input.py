@@ -12,6 +12,7 @@ import numpy as np
 from rift_cl.cl.budget import format_bytes
 from rift_cl.cl.device import Device
 from rift_cl.commands.inputs.axis_alignment import Alignment
+from rift_cl.commands.inputs.beam_level import BeamLevel, beam_level
 from rift_cl.commands.inputs.row_doubts import row_doubts
 from rift_cl.commands.inputs.scan_rows import check_center, scan_identity
 from rift_cl.commands.inputs.told_axis import axis_of_cone
@@ -161,6 +162,8 @@ class ConeInput:
         circle = isinstance(self.geometry, Cone) and self.geometry.circular
         settled = settings.center is not None or not circle
         self.window = VolumeWindow.of(settings, self.geometry, settled=settled)
+        # What air reads in the middle row, where that is surely not zero.
+        self.air: BeamLevel | None = None
         # Slices below the volume and above it that rays meet, where the object goes on there.
         self.beyond = 0, 0
         self._check_memory()
@@ -214,7 +217,9 @@ class ConeInput:
         """Find the axis and the sense of rotation, unless they are said, and say what is done."""
         self.axis = self._found_axis()
         middle = self.scan.shape[1] // 2
-        self.notes += row_doubts(self.scan, middle, self.clean.read(middle, middle + 1))
+        read = self.clean.read(middle, middle + 1)
+        self.notes += row_doubts(self.scan, middle, read)
+        self.air = beam_level(read.projections[:, 0])
         self.geometry = self._geometry()
         self.window = VolumeWindow.of(self.settings, self.geometry)
         if self.tilt and isinstance(self.geometry, Cone):
@@ -230,8 +235,10 @@ class ConeInput:
         if not self.settings.iterative and (isinstance(scan, Vectors) or np.ptp(scan.heights)):
             # The formula of a helix says itself which slices it knows.
             return 0, 0
+        air = 0 if self.air is None else self.air.levels.astype(np.float32)[:, None]
         first, middle, last = (
-            self.clean.read(row, row + 1).projections[:, 0] for row in (0, rows // 2, rows - 1)
+            self.clean.read(row, row + 1).projections[:, 0] - air
+            for row in (0, rows // 2, rows - 1)
         )
         below, above = slices_beyond(scan, self.window.whole)
         return below * goes_on(first, middle), above * goes_on(last, middle)

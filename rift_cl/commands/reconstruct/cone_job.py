@@ -222,6 +222,8 @@ class ConeReconstruction:
         """Find the axis, and make the operators again for it."""
         self.source.locate()
         self.inversion.window = self.source.window
+        # The axis decides how large the volume is, where that is not said.
+        self.kept.shape = self.shape
         self.projector, self._formula = self._operators()
         self._check_parts()
         if self._formula is not None and not isinstance(self._formula, Backprojection):
@@ -412,6 +414,9 @@ class ConeReconstruction:
         """
         scan = self.source.geometry
         if not isinstance(self._formula, FDK) or not isinstance(scan, Cone):
+            return
+        # Air that is off zero is no object that goes on.
+        if self.source.air is not None:
             return
         bin, turn = scan.center[1], is_full_turn(scan.angles)
         further = sees_further(bin, scan.bins)

@@ -191,7 +191,6 @@ class Reconstruction:
         if going_on and not self.settings.preview:
             self.kept.go_on(self._facts())
             self._ours = self._gone_on = True
-        self.kept.shape = self.shape
         if self._gone_on:
             self.source.notes.append(
                 f"Gone on after {self.kept.done} of {self.shape[0]} slices; steps, seconds and "
@@ -213,7 +212,6 @@ class Reconstruction:
         # That process has told its doubts.
         self._locate(doubt=False)
         self.kept.go_on(self._facts(), names)
-        self.kept.shape = self.shape
 
     def _take_found(self) -> None:
         """Take what was found when the run began: the axis, unless it is said, and the projector.
@@ -230,6 +228,8 @@ class Reconstruction:
         if not self.source.settled:
             self.inversion.check_memory()
         self.source.locate(doubt=doubt)
+        # The axis decides how large slices are, where that is not said.
+        self.kept.shape = self.shape
         self.inversion.slabs([slice(0, 1)])
 
     @cached_property

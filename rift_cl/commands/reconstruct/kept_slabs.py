@@ -43,7 +43,7 @@ class SlabFolder:
 
     Args:
         path: the folder; made by ``begin``.
-        shape: (z, y, x) of the volume.
+        shape: (z, y, x) of the volume; set anew once the axis is known, which may decide it.
     """
 
     def __init__(self, path: Path, shape: tuple[int, int, int]) -> None:
