@@ -1,9 +1,9 @@
 """Random splats in and round a grid of voxels, and what the twin makes of them."""
 
 import numpy as np
+from projection_scenes import sent
 
 from rift_cl.reference.voxels import edge, voxelise
-from rift_cl.splat import Splats
 from rift_cl.splat.orders import count_of
 from rift_cl.splat.voxels import voxelise as on_device
 
@@ -32,7 +32,7 @@ def order_of_splats(values):
 
 def drawn(device, values, grid, dilation=0.0):
     """The volume that the kernels make, on the host."""
-    splats = Splats.upload(device, **values)
+    splats = sent(device, values)
     return device.get(on_device(device, splats, grid, dilation=dilation))
 
 
