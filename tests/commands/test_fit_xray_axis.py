@@ -219,6 +219,7 @@ def test_cones_that_no_formula_takes_are_fitted(tmp_path, kind):
     _, said, metrics = fitted(path, tmp_path / "fit", center=center, kind="attenuation")
     assert "20 steps of conjugate gradients stand in for it" in said
     assert "cgls, sirt and tv" not in said
+    assert ("The source moves along the axis" in said) == (kind == "helix")
     assert metrics["start_error"] < 0.4
     assert metrics["scores"]["held out"]["fbp_error"] < 0.15
 

@@ -102,6 +102,7 @@ def test_a_helix_has_its_density(tmp_path: Path) -> None:
     assert volume[z**2 + y**2 + x**2 < 16].mean() == pytest.approx(0.02, rel=0.02)
     metrics = json.loads((tmp_path / "a" / "metrics.json").read_text())
     assert "Katsevich" in " ".join(metrics["assumed"])
+    assert "sense of rotation, the sign of the heights" in " ".join(metrics["assumed"])
 
 
 def test_axis_and_sense_are_found(ball: Path, tmp_path: Path) -> None:

@@ -35,6 +35,7 @@ from rift_cl.commands.inputs.told_axis import (
     doubted_parallel,
     found_in_words,
     offset_in_words,
+    unchecked_helix,
 )
 from rift_cl.errors import InputError
 from rift_cl.geometry import Camera, Cone, Grid, Parallel, Vectors
@@ -239,7 +240,7 @@ class XrayInput:
         if scan.cone is not None:
             axis = axis_of_cone(scan, center, tilt, self.device)
             self.center, self.tilt, self.turned = axis.center, axis.tilt, axis.turned
-            return list(axis.notes)
+            return [*axis.notes, *unchecked_helix(scan)]
         spanned, detector_rows = self.rows[1] - self.rows[0], scan.shape[1]
         if center is not None:
             away = sum(self.rows) // 2 - (detector_rows - 1) / 2

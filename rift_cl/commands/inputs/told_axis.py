@@ -94,6 +94,16 @@ def axis_of_cone(
     return ToldAxis(axis.center, lean, axis.turned, axis.record, notes)
 
 
+def unchecked_helix(scan: ScanFile) -> list[str]:
+    """What of a helix nothing checks: no opposite rays lie in one plane across the axis."""
+    if not isinstance(scan.cone, Cone) or scan.cone.circular:
+        return []
+    return [
+        "The source moves along the axis: the sense of rotation, the sign of the heights and "
+        "the place of the axis were taken as given, and not checked against the data."
+    ]
+
+
 def found_in_words(found: AxisEstimate, rows: int, spanned: int, tilt: float | None) -> list[str]:
     """What is said of an axis of parallel rays that was found, and of its tilt.
 

@@ -15,7 +15,7 @@ from rift_cl.commands.inputs.axis_alignment import Alignment
 from rift_cl.commands.inputs.beam_level import BeamLevel, beam_level
 from rift_cl.commands.inputs.row_doubts import row_doubts
 from rift_cl.commands.inputs.scan_rows import check_center, scan_identity
-from rift_cl.commands.inputs.told_axis import axis_of_cone
+from rift_cl.commands.inputs.told_axis import axis_of_cone, unchecked_helix
 from rift_cl.commands.reconstruct.binned_file import binned_file, row_binning
 from rift_cl.commands.reconstruct.clean_rows import CleanRows
 from rift_cl.commands.reconstruct.settings import ReconstructSettings
@@ -251,7 +251,7 @@ class ConeInput:
             averaged = f"Blocks of {block} x {n} (rows x bins) detector pixels were averaged."
             self.notes.append(f"{averaged} {lost}".rstrip())
         self.notes += self.clean.notes() + self._pitch_note() + self._orbit_note()
-        self.notes += self._helix_note()
+        self.notes += unchecked_helix(self.file)
         if any(self.beyond):
             self.notes.append(self._beyond_note())
         if self.scan.background:
@@ -269,16 +269,6 @@ class ConeInput:
             f"Doubt: the geometry has the source's orbit at row {cone.center[0]:g}, off the "
             f"detector's rows 0 to {rows - 1}: 'center' is the row of the orbit and then the bin "
             "of the axis."
-        ]
-
-    def _helix_note(self) -> list[str]:
-        """What of a helix nothing checks: no opposite rays lie in one plane across the axis."""
-        cone = self.file.cone
-        if not isinstance(cone, Cone) or cone.circular:
-            return []
-        return [
-            "The source moves along the axis: the sense of rotation, the sign of the heights and "
-            "the place of the axis were taken as given, and not checked against the data."
         ]
 
     def _pitch_note(self) -> list[str]:

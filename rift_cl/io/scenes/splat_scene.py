@@ -155,8 +155,8 @@ class SplatScene:
         of any scalar type, and with others between them or elements beside them, which are left
         out. The other formats are known by their names; an .spz file is read in its own axes, y
         up. Splats that cannot be drawn, since a number of theirs is NaN or infinite, are left out,
-        and a warning counts them. Another warning tells of
-        scales and opacities that seem to be stored as they are.
+        and a warning counts them. Another warning tells of scales and opacities that seem to be
+        stored as they are.
 
         Args:
             path: the file.

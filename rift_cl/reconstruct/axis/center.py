@@ -34,8 +34,8 @@ def find_center(
         sinogram: line integrals, (angle, bin) or (angle, row, bin); of a stack, at most five rows
             are looked at, evenly chosen; of a cone those near the row ``center[0]``, as they are
             or averaged in at most five groups.
-        angles: directions in radians, in any order; or the scan, ``Parallel``, ``Fan``
-            or ``Cone``, whose centre (bin) and sense need not be right.
+        angles: directions in radians, in any order; or the scan, ``Parallel``, ``Fan`` or
+            ``Cone``, whose centre (bin) and sense need not be right.
         span: where to search, in bins; for half turns the middle 60 % of the detector if not
             given, for full turns all of it but the outermost bins.
         device: accepted as by every method; the search runs on the host.
@@ -46,10 +46,9 @@ def find_center(
     Raises:
         InputError: the data do not tell the axis: no contrast, too few views, a wide gap between
             them, or nothing that stands out of the noise. Also: the span is not on the detector,
-            or the scan is another one than a ``Parallel``, a ``Fan`` or a circular
-            ``Cone``.
-        ShapeError: the sinogram has not two or three axes, or not a view for each angle,
-            or not the bins of the scan.
+            or the scan is another one than a ``Parallel``, a ``Fan`` or a circular ``Cone``.
+        ShapeError: the sinogram has not two or three axes, or not a view for each angle, or not
+            the bins of the scan.
         NonFiniteError: a sample is not finite.
     """
     shape = np.shape(sinogram)
