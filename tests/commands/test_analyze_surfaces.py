@@ -105,7 +105,7 @@ def test_where_nothing_tells_what_stands_where_suggestions_stay_near_and_say_so(
     assert main(["analyze", str(folder), "--out", str(out), *words]) == 0
     assert f"about {ASTRAY:.0f} degrees from the views at hand" in capsys.readouterr().out
     for row in csv.DictReader((out / "views.csv").read_text().splitlines()):
-        place = np.array([float(row[axis]) for axis in "xyz"])
+        place = np.array([float(row[f"{axis}, units"]) for axis in "xyz"])
         way = place / np.linalg.norm(place)
         assert (sampled.directions() @ way).max() > math.cos(math.radians(ASTRAY + 3))
 

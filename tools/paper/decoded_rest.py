@@ -109,10 +109,10 @@ class DecodedTrainer(Trainer):
         means = torch.from_numpy(self.device.get(self.parameters.raw["means"]))
         return self.network(means, torch.tensor(camera.center, dtype=torch.float32))
 
-    def _compared(self, frame: Any, number: int, rate: float) -> Any:
+    def _compared(self, frame: Any, number: int) -> Any:
         """The loss of the sum of both kinds of channels, which have the same gradient."""
         add_rest(self.device, frame.image)
-        value, by_image = super()._compared(frame, number, rate)
+        value, by_image = super()._compared(frame, number)
         by = by_image.reshape((-1, 2 * _COLORS))
         copy_columns(self.device, by, 0, by, _COLORS, _COLORS)
         return value, by_image

@@ -365,7 +365,8 @@ def _no_counts_of(found: Finding, seen: Sample, bright: float, dark: float) -> s
 
 def _few_bright(found: Finding, seen: Sample, bright: float, dark: float) -> tuple[str, ...]:
     """A doubt about single values that no beam explains; arguments as for ``_no_counts_of``."""
-    if seen.high - dark <= _BRIGHTER * (bright - dark):
+    # Flats no brighter than the darks are told by whoever divides by them.
+    if bright <= dark or seen.high - dark <= _BRIGHTER * (bright - dark):
         return ()
     return (
         f"Doubt: a few values of {found.name} ({seen}) are more than {_BRIGHTER:g} times as bright "
