@@ -1,4 +1,4 @@
-"""Adam on the host, for the few numbers that belong to one view: its pose, its exposure.
+"""Adam on the host, for the few numbers of a view's pose.
 
 Each view has its own count of steps, since only the view that was looked at has a gradient.
 """
