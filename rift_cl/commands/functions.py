@@ -9,7 +9,8 @@ Nothing is printed: ``progress`` is called with each ``Report``, and ``progress=
 commands' bar, in a notebook below the cell. A run is broken off where ``progress`` returns False.
 Then, and where an interrupt breaks off what a command keeps at Ctrl-C, ``StoppedError`` says what
 is kept in ``out`` and how to go on; a fit keeps a checkpoint of the step that it was at. An error
-that ``progress`` raises ends a run at once.
+that ``progress`` raises ends a run at once. Errors and notes name options as keywords; files, as
+commands have them.
 """
 
 from __future__ import annotations
@@ -20,6 +21,7 @@ import tempfile
 import weakref
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, nullcontext
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, Literal, TypeVar
 
@@ -27,6 +29,7 @@ import numpy as np
 
 from rift_cl.commands.interrupts import gentle_interrupt, plain_interrupt
 from rift_cl.commands.progress_bar import show_progress
+from rift_cl.commands.python_words import in_python, python_words
 from rift_cl.commands.results import (
     AnalyzedViews,
     FittedScene,
@@ -79,12 +82,13 @@ def reconstruct_scan(
     from rift_cl.commands.reconstruct.settings import ReconstructSettings
     from rift_cl.commands.reconstruct.volume import volume_path
 
-    with _folder(out) as (folder, keep):
+    with _folder(out, ReconstructSettings) as (folder, keep):
         given = {"scan": scan, "out": folder, **settings}
         job = reconstruction_of(_settings(given, "reconstruct", ReconstructSettings))
         path = volume_path(job.settings)
         if job.finished:
-            return ReconstructedScan(*_finished_run(folder, ReconstructSettings), path=path)
+            record = _finished_run(folder, ReconstructSettings)
+            return keep(ReconstructedScan(*record, path=path))
         _run(job, progress)
         record = (folder, job.decided, dict(job.metrics), tuple(job.source.notes))
         return keep(ReconstructedScan(*record, path=path))
@@ -125,7 +129,7 @@ def fit(
     if kind not in (None, "photos", "xray"):
         raise InputError(f"kind is {kind!r}, wanted 'photos' or 'xray'")
     xray = is_scan_file(Path(capture)) if kind is None else kind == "xray"
-    with _folder(out) as (folder, keep):
+    with _folder(out, FitPhotosSettings, FitXraySettings) as (folder, keep):
         given = {"capture": capture, "out": folder, **settings}
         job: Fit | XrayFit
         if xray:
@@ -162,7 +166,7 @@ def evaluate(
     from rift_cl.commands.evaluate.job import Evaluation
     from rift_cl.commands.evaluate.settings import EvalSettings
 
-    with _folder(out) as (folder, keep):
+    with _folder(out, EvalSettings) as (folder, keep):
         given = {"scene": scene, "captures": tuple(captures), "out": folder, **settings}
         job = Evaluation(_settings(given, "eval", EvalSettings))
         _run(job, progress)
@@ -190,7 +194,7 @@ def render(
     from rift_cl.commands.render.job import Render
     from rift_cl.commands.render.settings import RenderSettings
 
-    with _folder(out) as (folder, keep):
+    with _folder(out, RenderSettings) as (folder, keep):
         given = {"scene": scene, "out": folder, **settings}
         job = Render(_settings(given, "render", RenderSettings))
         _run(job, progress)
@@ -224,7 +228,7 @@ def analyze(
     from rift_cl.commands.analyze.job import Analysis
     from rift_cl.commands.analyze.settings import AnalyzeSettings
 
-    with _folder(out) as (folder, keep):
+    with _folder(out, AnalyzeSettings) as (folder, keep):
         given = {"source": source, "out": folder, **settings}
         job = Analysis(_settings(given, "analyze", AnalyzeSettings))
         _run(job, progress)
@@ -253,7 +257,7 @@ def plan_views(
     from rift_cl.commands.plan.job import Planning
     from rift_cl.commands.plan.settings import PlanSettings
 
-    with _folder(out) as (folder, keep):
+    with _folder(out, PlanSettings) as (folder, keep):
         job = Planning(_settings({"views": views, "out": folder, **settings}, "plan", PlanSettings))
         _run(job, progress)
         assert job.found is not None
@@ -283,10 +287,11 @@ def export(
     from rift_cl.commands.export.mesh import MeshExport
     from rift_cl.commands.export.settings import ExportSettings
 
-    parsed = _settings({"scene": scene, "out": out, **settings}, "export", ExportSettings)
-    job = MeshExport(parsed) if parsed.mesh else Export(parsed)
-    _run(job, progress)
-    return job.path
+    with python_words(ExportSettings):
+        parsed = _settings({"scene": scene, "out": out, **settings}, "export", ExportSettings)
+        job = MeshExport(parsed) if parsed.mesh else Export(parsed)
+        _run(job, progress)
+        return job.path
 
 
 def view(scene: PathLike, out: PathLike | None = None, **settings: Any) -> ScenePage:
@@ -323,8 +328,26 @@ R = TypeVar("R", bound=Result)
 
 
 @contextmanager
-def _folder(out: PathLike | None) -> Iterator[tuple[Path, Callable[[R], R]]]:
-    """A command's folder, and what ties a temporary one to the record that is given back."""
+def _folder(out: PathLike | None, *settings: type) -> Iterator[tuple[Path, Callable[[R], R]]]:
+    """A command's folder, and what makes a run's record one for Python.
+
+    A temporary folder goes with the record. Its notes, and errors, name options as keywords.
+
+    Args:
+        out: the folder; a temporary one when None.
+        *settings: classes of the settings that the options are from.
+    """
+    with python_words(*settings), _own_or_temporary(out) as (folder, keep):
+        yield (
+            folder,
+            lambda record: keep(
+                replace(record, notes=tuple(in_python(note, *settings) for note in record.notes))
+            ),
+        )
+
+
+@contextmanager
+def _own_or_temporary(out: PathLike | None) -> Iterator[tuple[Path, Callable[[R], R]]]:
     if out is not None:
         yield Path(out), lambda record: record
         return

@@ -82,7 +82,7 @@ def test_an_axis_that_the_data_contradict_is_doubted(
     common = {"kind": "attenuation", "size": 8, **options}
     for center, doubted in ((30.3, False), (29.3, True), (33.0, True)):
         made = rift.reconstruct_scan(scans[beam], tmp_path / str(center), center=center, **common)
-        told = [note for note in made.notes if f"--center {center:g}" in note]
+        told = [note for note in made.notes if f"center={center:g}" in note]
         assert bool(told) == doubted
         assert not doubted or "at bin 30." in told[0]
         assert (
@@ -111,7 +111,7 @@ def test_least_squares_that_stop_at_no_noise_say_what_the_data_show(tmp_path: Pa
     np.savez(tmp_path / "scan.npz", projections=views, angles=angles)
     common = {"kind": "attenuation", "center": 23.5, "method": "cgls", "steps": 3}
     told = rift.reconstruct_scan(tmp_path / "scan.npz", tmp_path / "a", **common).notes
-    (found,) = [note for note in told if "--noise" in note]
-    assert float(found.split("--noise ")[1].split()[0]) == pytest.approx(noise, rel=0.15)
+    (found,) = [note for note in told if "noise=" in note]
+    assert float(found.split("noise=")[1].split()[0]) == pytest.approx(noise, rel=0.15)
     told = rift.reconstruct_scan(tmp_path / "scan.npz", tmp_path / "b", noise=noise, **common).notes
-    assert not [note for note in told if "--noise" in note]
+    assert not [note for note in told if "noise=" in note]
