@@ -8,6 +8,7 @@ gives back C-ordered native float32 (float64 where wanted) of the wanted shape, 
 from __future__ import annotations
 
 import itertools
+import sys
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, TypeGuard
 
@@ -334,6 +335,18 @@ def is_tensor(value: Any) -> bool:
 def is_jax_array(value: Any) -> bool:
     """Whether a value is an array of JAX's or stands for one (asked without importing JAX)."""
     return type(value).__module__.partition(".")[0] in ("jax", "jaxlib")
+
+
+def alike(found: NDArray[Any], given: Any) -> Any:
+    """An array as a tensor of torch or an array of JAX, where what was given is one.
+
+    Gradients do not pass: it is for results of what has none, as those of solvers that iterate.
+    """
+    if is_tensor(given):
+        return sys.modules["torch"].from_numpy(found)
+    if is_jax_array(given):
+        return sys.modules["jax"].numpy.asarray(found)
+    return found
 
 
 def check_output(out: Any, shape: tuple[int, ...], dtype: DTypeLike = np.float32) -> NDArray[Any]:

@@ -40,6 +40,13 @@ def test_an_operator_takes_a_jax_array_as_it_takes_any_other(device):
         A(x, out=np.empty((5, 9), np.float32))
 
 
+def test_a_solver_gives_a_jax_array_for_one(device):
+    A, y = projector(device), white(5, 9)
+    found = rift.cgls(A, y, steps=2)
+    assert isinstance(found, jax.Array)
+    assert np.array_equal(found, rift.cgls(A, np.asarray(y), steps=2))
+
+
 def test_leading_dimensions_and_vmap_are_batches(device):
     A, x = projector(device), white(2, 3, 6, 7)
     y = apply(A, x)

@@ -35,6 +35,24 @@ def white(*shape, dtype=torch.float32, **options):
     return torch.randn(*shape, dtype=dtype, generator=generator, **options)
 
 
+@pytest.mark.parametrize(
+    "solve",
+    [
+        lambda A, y: rift.cgls(A, y, steps=2),
+        lambda A, y: rift.sirt(A, y, steps=2),
+        lambda A, y: rift.tv(A, y, weight=0.1, steps=2),
+    ],
+    ids=["cgls", "sirt", "tv"],
+)
+def test_a_solver_gives_a_tensor_for_a_tensor(device, solve):
+    A, y = projector(device), white(5, 9)
+    found = solve(A, y)
+    assert isinstance(found, torch.Tensor)
+    assert np.array_equal(found.numpy(), solve(A, y.numpy()))
+    with pytest.raises(DTypeError, match="detach"):
+        solve(A, y.requires_grad_())
+
+
 @pytest.fixture
 def exact(device):
     """A small projector in float64, for finite differences."""

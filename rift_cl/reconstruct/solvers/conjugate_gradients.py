@@ -205,7 +205,8 @@ def cgls(
         out: where to put the result.
 
     Returns:
-        The image, of shape ``A.domain``, on the side (host or device) where ``y`` is.
+        The image, of shape ``A.domain``, on the side (host or device) where ``y`` is, and an
+        array of torch or JAX where that is one; no gradients pass.
 
     Raises:
         InputError: an argument does not fit, is out of its range, or holds NaN or infinity.

@@ -202,7 +202,8 @@ def sirt(
         out: where to put the result.
 
     Returns:
-        The image, of shape ``A.domain``, on the side (host or device) where ``y`` is.
+        The image, of shape ``A.domain``, on the side (host or device) where ``y`` is, and an
+        array of torch or JAX where that is one; no gradients pass.
 
     Raises:
         InputError: an argument does not fit, or holds NaN or infinity.

@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 from rift_cl.cl.arithmetic import axpby
 from rift_cl.cl.elementwise import copy
 from rift_cl.cl.host_arrays import (
+    alike,
     as_device_array,
     check_output,
     download,
@@ -193,7 +194,7 @@ def solve(solver: Solver, steps: int, *, like: Any, out: Any = None) -> Any:
     Args:
         solver: the method.
         steps: most steps.
-        like: the data: the image comes to the host if they are there.
+        like: the data: the image comes to the host if they are there, as an array of their kind.
         out: array to put it into; a new one if not given.
     """
     data = solver.data
@@ -205,9 +206,10 @@ def solve(solver: Solver, steps: int, *, like: Any, out: Any = None) -> Any:
     for _ in solver.run(steps):
         pass
     if here and data.home.on_device:
-        return download(data.device, solver.image, out)
+        found = download(data.device, solver.image, out)
+        return found if out is not None else alike(found, like)
     if out is None:
-        return solver.image
+        return alike(solver.image, like) if here else solver.image
     copy(data.device, solver.image, out)
     if not here:
         finish_for_others(data.device, out)
