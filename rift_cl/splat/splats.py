@@ -22,6 +22,7 @@ from rift_cl.cl.device import Device
 from rift_cl.cl.host_arrays import as_plain, as_real_array, upload
 from rift_cl.errors import DTypeError, InputError, ShapeError, WrongTypeError
 from rift_cl.splat.orders import count_of, order_of
+from rift_cl.splat.rounded_places import check_rounding, distances_moved
 
 # Numbers of spherical harmonics of degree 0 to 4.
 _COEFFICIENTS = (1, 4, 9, 16, 25)
@@ -139,8 +140,9 @@ class Splats:
             ShapeError: an array does not fit the others.
             DTypeError: an array does not hold real numbers.
             InputError: a scale is negative, as a logarithm is, a covariance is not symmetric, a
-                splat's shape is given twice or not at all, covariances have modes, or a number of
-                modes belongs to no order.
+                splat's shape is given twice or not at all, covariances have modes, a number of
+                modes belongs to no order, or ``means`` are float64 and so far from the origin that
+                float32 moves splats by more than a tenth of a width.
             ResourceLimitError: they do not fit the device's memory budget.
         """
         hosts = {"means": means, "quats": quats, "scales": scales, "opacities": opacities}
@@ -158,6 +160,10 @@ class Splats:
             check_scales(float(np.fmin.reduce(ready["scales"], axis=None, initial=0)))
         # Arrays that do not fit are refused before anything is allocated.
         count = len(cls(**ready))
+        if scales is not None and (places := np.asarray(means)).dtype == np.float64:
+            moved = distances_moved(places, ready["means"])
+            with np.errstate(divide="ignore"):
+                check_rounding("Splats: means", moved, ready["means"], np.log(ready["scales"]))
         need = sum(host.nbytes for host in ready.values() if host is not None)
         plan_chunks(1, need, 0, device.budget, what=f"scene of {count} splats")
         return cls(**{name: _sent(device, host) for name, host in ready.items()})

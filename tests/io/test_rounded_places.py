@@ -9,7 +9,8 @@ import pytest
 import splat_files as made
 
 import rift_cl as rift
-from rift_cl.errors import FileFormatError
+from rift_cl.errors import FileFormatError, InputError
+from rift_cl.splat.splats import Splats
 
 
 @pytest.mark.parametrize("text", [False, True])
@@ -37,6 +38,22 @@ def test_splats_of_no_width_may_be_moved_by_nothing_that_shows(tmp_path) -> None
     for axis in range(3):
         values[f"scale_{axis}"] = -60
     assert len(load_of(tmp_path / "a.ply", values, False)) == 20
+
+
+def test_places_of_arrays_are_refused_alike(device) -> None:
+    scene = made.scene(200, 0)
+    given = {name: value for name, value in vars(scene).items() if value is not None}
+    far = {**given, "means": scene.means + np.array([0, 4e6, 0])}
+    with pytest.raises(InputError, match=r"SplatScene: means: .* subtract \(-?0, 4000000, -?0\)"):
+        rift.SplatScene(**far)
+    # Whoever gives float32 has rounded already; what float32 holds is moved by nothing.
+    assert len(rift.SplatScene(**{**far, "means": far["means"].astype(np.float32)})) == 200
+    assert len(rift.SplatScene(**{**far, "means": np.round(far["means"])})) == 200
+    drawn = {"opacities": np.full(200, 0.5), "quats": scene.quats, "colors": np.ones((200, 3))}
+    with pytest.raises(InputError, match=r"Splats: means: .* 4000000"):
+        Splats.upload(device, means=far["means"], scales=np.full((200, 3), 0.05), **drawn)
+    wide = Splats.upload(device, means=far["means"], scales=np.full((200, 3), 50.0), **drawn)
+    assert len(wide) == 200
 
 
 def load_of(path: Path, values: np.ndarray, text: bool) -> rift.SplatScene:

@@ -26,9 +26,9 @@ from rift_cl.errors import FileFormatError
 from rift_cl.io.boundary import check_claim
 from rift_cl.io.scenes.ply_body import read_blocks, record_runs
 from rift_cl.io.scenes.ply_header import PlyHeader, read_header
-from rift_cl.io.scenes.rounded_places import check_rounding, distances_moved
 from rift_cl.io.scenes.scene_drawing import SceneDrawing, read_drawing
 from rift_cl.io.scenes.splat_basis import SceneBasis, light_comments, read_basis, read_light
+from rift_cl.splat.rounded_places import check_rounding, distances_moved
 from rift_cl.splat.settings import SplatMode
 
 if TYPE_CHECKING:
@@ -82,9 +82,11 @@ def read_ply(
                 column[start : start + len(block)] = block[name]
         if longer:
             part = slice(start, start + len(block))
-            moved[part] = distances_moved(block, arrays["means"][part])
+            places = np.stack([block[name].astype(np.float64) for name in "xyz"], axis=1)
+            moved[part] = distances_moved(places, arrays["means"][part])
         start += len(block)
-    check_rounding(path, moved, arrays)
+    placed = arrays["means"], arrays["log_scales"]
+    check_rounding(str(path), moved, *placed, error=FileFormatError)
     return mode, basis, drawing, arrays
 
 

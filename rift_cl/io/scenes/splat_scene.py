@@ -38,6 +38,7 @@ from rift_cl.io.scenes.splat_file import encode_splat, read_splat
 from rift_cl.io.scenes.splat_ply import COEFFICIENTS, encode_ply, read_ply, scene_shapes
 from rift_cl.io.scenes.spz_file import read_spz
 from rift_cl.io.scenes.whole_splats import whole_splats
+from rift_cl.splat.rounded_places import check_rounding, distances_moved
 from rift_cl.splat.settings import Activation, SplatMode
 from rift_cl.splat.splats import Splats
 
@@ -75,7 +76,8 @@ class SplatScene:
         ShapeError: an array does not fit the others.
         DTypeError: an array does not hold real numbers.
         NonFiniteError: an array holds NaN or infinity.
-        InputError: a choice is unknown, or not for scenes of this mode.
+        InputError: a choice is unknown, or not for scenes of this mode; or ``means`` are float64
+            and so far from the origin that float32 moves splats by more than a tenth of a width.
     """
 
     means: NDArray[np.float32]
@@ -126,6 +128,9 @@ class SplatScene:
                 getattr(self, name), shape, name=f"SplatScene: {name}", wants="the scene"
             )
             object.__setattr__(self, name, array)
+        if means.dtype == np.float64:
+            moved = distances_moved(means, self.means)
+            check_rounding("SplatScene: means", moved, self.means, self.log_scales)
 
     def __repr__(self) -> str:
         """How many splats there are, and what they are made of."""
