@@ -1,7 +1,8 @@
 /* Composite the splats of a tile front to back; driver for CPUs.
  *
  *     light: C = sum of w c + T background,  w = alpha T,  T the product of (1 - alpha) so far;
- *     ADDITIVE: C = sum of weight Q exp(-sigma) c, whatever the order (line integrals of X-rays).
+ *     ADDITIVE: C = sum of weight Q exp(-sigma) c, whatever the order (line integrals of X-rays);
+ *     MEDIAN: the last channel is c of the splat with which T falls to a half (include/raster/alpha.h).
  *
  * Index space: (tiles), of the rows of tiles from first_tile_row on; each item owns one. A batch of
  * the tile's entries is read once, and for each block of 4 x ROWS pixels the few that touch it are
@@ -123,6 +124,10 @@ static int draw_block(
           found[j][v] = splat_counts(power, density, peak) ? (ADDITIVE ? density : held) : 0;
         }
       }
+#if MEDIAN
+      lanes left[VECTORS];
+      UNROLL for (int v = 0; v < VECTORS; v++) left[v] = t[v];
+#endif
 #if !ADDITIVE
       for (int j = 0; j < some; j++) {
         const lanes_int past = batch->order[list[i + j]] + before;
@@ -143,8 +148,15 @@ static int draw_block(
       for (int j = 0; j < some; j++) {
         const int k = list[i + j];
         UNROLL for (int v = 0; v < VECTORS; v++)
-          UNROLL for (int n = 0; n < CHANNELS; n++)
+          UNROLL for (int n = 0; n < SUMS; n++)
             color[v][n] = color[v][n] + found[j][v] * color_seen(batch, &s, k, n, within[v]);
+#if MEDIAN
+        UNROLL for (int v = 0; v < VECTORS; v++) {
+          const lanes_int before = (found[j][v] > 0) & (left[v] > 0.5f);
+          color[v][SUMS] = before ? color_seen(batch, &s, k, SUMS, within[v]) : color[v][SUMS];
+          left[v] = left[v] - found[j][v];
+        }
+#endif
       }
     }
 #if !ADDITIVE && !SMOOTH

@@ -79,6 +79,7 @@ KERNEL void splat_raster_gpu(
         float splat[4 * QUADS];
         read_splat(splat, staged, k);
         const Seen seen = see(splat, x, y AND_MODES);
+        const float before = left;
         float share = seen.density;
 #if !ADDITIVE
         const float hidden = hidden_by(seen.density);
@@ -91,7 +92,10 @@ KERNEL void splat_raster_gpu(
 #endif
         if (share == 0) continue;
         end = begin + k + 1;
-        UNROLL for (int n = 0; n < CHANNELS; n++) color[n] += share * color_seen(&seen, splat, n AND_MODES);
+        UNROLL for (int n = 0; n < SUMS; n++) color[n] += share * color_seen(&seen, splat, n AND_MODES);
+#if MEDIAN
+        if (before > 0.5f) color[SUMS] = color_seen(&seen, splat, SUMS AND_MODES);
+#endif
       }
   }
   if (!inside) return;

@@ -202,6 +202,8 @@ def render(
     """
     how = drawer(size, model=model, settings=settings, device=device)
     check_depth(depth, how.settings)
+    if depth == "median":
+        raise InputError("the median depth has no gradient: rift_cl.splat.Renderer draws it")
     screens = project(how, means, quats, scales, opacities, viewmats, Ks, covars=covars)
     _check_stored(scales, opacities, how.settings)
     views, count = screens.culled.shape

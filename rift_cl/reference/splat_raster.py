@@ -27,12 +27,14 @@ class Rules:
         cap: largest alpha.
         additive: add line integrals in place of compositing.
         smooth: no thresholds, and a falloff that fades smoothly.
+        median: the last feature is that of the splat that leaves half of the light.
     """
 
     tile: int = 16
     cap: float = 0.99
     additive: bool = False
     smooth: bool = False
+    median: bool = False
 
 
 def raster(
@@ -90,7 +92,10 @@ def _tile(
             counts = (alpha >= ALPHA_THRESHOLD) & ~finished
             finished |= counts & (left * (1 - alpha) <= TRANSMITTANCE_THRESHOLD)
             alpha = np.where(counts & ~finished, alpha, 0)
-        color += (alpha * left)[..., None] * features[splat]
+        sums = features.shape[1] - rules.median
+        color[..., :sums] += (alpha * left)[..., None] * features[splat, :sums]
+        if rules.median:
+            color[(alpha > 0) & (left > 0.5), sums] = features[splat, sums]
         left = left * (1 - alpha)
     return color, left
 

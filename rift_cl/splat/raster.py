@@ -137,6 +137,8 @@ class ScreenSplats:
         screen: (N, 8): mean x, mean y, conic a, b, c, weight, extent x, extent y.
         features: (N, D), the channels that are drawn.
         modes: the polynomials of splats that have some; None for Gaussians.
+        median: whether a pixel's last channel is no sum but the feature of the splat that leaves
+            half of the light, or of the last one where none does. It has no gradient.
 
     ``records``, (N, 16), hold what tiles want of them in one line each, see
     ``kernels/include/raster/screen_record.h``; they are None until ``packed`` makes them and after
@@ -146,6 +148,7 @@ class ScreenSplats:
     screen: DeviceArray
     features: DeviceArray
     modes: ScreenModes | None = None
+    median: bool = False
     records: DeviceArray | None = field(default=None, init=False)
 
     @property
@@ -264,6 +267,7 @@ def rasterize(
             **_drawn(device, splats, background, lists, size, settings),
             **_channels(splats, first, count),
             **_macros(device, splats, settings, count),
+            **({"MEDIAN": 1} if splats.median and first + count == channels else {}),
         )
     return raster
 

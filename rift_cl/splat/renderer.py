@@ -11,7 +11,7 @@ from __future__ import annotations
 from contextlib import suppress
 from copy import copy
 from dataclasses import dataclass, replace
-from typing import Literal, NamedTuple
+from typing import Literal, NamedTuple, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -45,7 +45,7 @@ from rift_cl.splat.tile_lists import TileLists
 # Pixels that one work-item of a CPU goes through.
 _PIXEL_RUN = 1024
 
-DepthKind = Literal["accumulated", "expected"]
+DepthKind = Literal["accumulated", "expected", "median"]
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -54,7 +54,7 @@ class Frame(MayBeGivenUp):
 
     Args:
         projection: what was drawn, and how the camera sees it.
-        depth: ``accumulated``, ``expected``, or None.
+        depth: ``accumulated``, ``expected``, ``median``, or None.
         channels: what the image's channels are.
         raster_pass: the splats on the screen, the image, and what the raster left for its gradient.
     """
@@ -167,8 +167,8 @@ def check_depth(depth: str | None, settings: SplatSettings) -> None:
     Raises:
         InputError: it is none that there is, or there is none in this mode.
     """
-    if depth not in (None, "accumulated", "expected"):
-        raise InputError(f"depth is {depth!r}, wanted None, accumulated or expected")
+    if depth is not None and depth not in get_args(DepthKind):
+        raise InputError(f"depth is {depth!r}, wanted None, {', '.join(get_args(DepthKind))}")
     if depth is not None and settings.mode == "xray":
         raise InputError("depth has no meaning in xray mode, in which nothing hides anything")
 
@@ -208,7 +208,10 @@ class Renderer:
             background: (D,) device array, for all channels but depth; black if not given. Depth
                 has none, and in xray mode there is none.
             depth: draw depth along the camera's axis as the last channel: ``accumulated``, the
-                sum of weights times depths, or ``expected``, that divided by alpha.
+                sum of weights times depths; ``expected``, that divided by alpha; or ``median``,
+                the depth of the splat that leaves half of the light, or of the last one that is
+                seen where none does. Where splats lie before a surface and behind it, the expected
+                depth is that of neither. The median has no gradient.
 
         Returns:
             The frame: ``.image`` (height, width, D), ``.transmittance`` (height, width), and what
@@ -229,7 +232,7 @@ class Renderer:
         projection = project(device, splats, camera, settings)
         raster_pass = draw(
             device,
-            *_on_screen(projection, channels),
+            *_on_screen(projection, channels, depth),
             settings=settings,
             memory=memory,
             background=behind,
@@ -277,7 +280,7 @@ class Renderer:
         rest = np.empty(camera.size, np.float32)
         for band in draw_bands(
             device,
-            *_on_screen(project(device, splats, camera, settings), channels),
+            *_on_screen(project(device, splats, camera, settings), channels, depth),
             settings=settings,
             memory=memory,
             background=behind,
@@ -324,9 +327,12 @@ class Renderer:
             asked for, is None (see ``FrameGradients``).
 
         Raises:
+            InputError: the frame has the median depth, which has no gradient.
             ShapeError: a gradient does not fit the frame.
             ResourceLimitError: not even one row of tiles fits the memory budget.
         """
+        if frame.depth == "median":
+            raise InputError("the median depth has no gradient: draw the expected one")
         device = self.device
         as_device_array(device, grad_image, frame.image.shape, name="grad_image")
         if grad_transmittance is not None:
@@ -445,11 +451,12 @@ class Renderer:
 
 
 def _on_screen(
-    projection: Projection, channels: Channels
+    projection: Projection, channels: Channels, depth: DepthKind | None
 ) -> tuple[ScreenSplats, DeviceArray, DeviceArray, tuple[int, int]]:
     """What the raster is given: splats on the screen, their boxes and depths, and its size."""
     features = gather_features(projection, channels)
-    screen = ScreenSplats(projection.screen, features, projection.modes)
+    median = depth == "median"
+    screen = ScreenSplats(projection.screen, features, projection.modes, median)
     return screen, projection.boxes, projection.depths, projection.camera.size
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -9,8 +10,15 @@ import pytest
 
 from rift_cl.commands.cli import main
 from rift_cl.commands.export import fused_depth
-from rift_cl.commands.export.fused_depth import Distances, chosen_cameras, grid_of, places_of
-from rift_cl.commands.export.mesh import surface
+from rift_cl.commands.export.fused_depth import (
+    Distances,
+    chosen_cameras,
+    disagreement,
+    grid_of,
+    places_of,
+    reach_of,
+)
+from rift_cl.commands.export.mesh import surface, without_fragments
 from rift_cl.errors import InputError
 from rift_cl.geometry import Aperture, Camera, look_at
 from rift_cl.io.captures.transforms_record import transforms_of
@@ -90,6 +98,66 @@ def test_a_slice_of_distances_is_their_definition():
         away = (depth[int(row), int(column)] - z) / (4 * grid.spacing[0]) if on else -np.inf
         assert seen[at] == (away > -1)
         assert inside[at] == pytest.approx(-min(away, 1) if away > -1 else -1, abs=1e-4)
+
+
+def spheres(views, radii):
+    """What cameras see that each take a sphere's radius for another."""
+    found = []
+    for camera, radius in zip(views, radii, strict=True):
+        moved = Camera(camera.size, camera.K, scaled_view(camera.view, 1 / radius))
+        found.append(depth_of_sphere(moved) * np.float32(radius))
+    return found
+
+
+def scaled_view(view, factor):
+    """The camera as it stands to a sphere ``1 / factor`` times as large about the same middle."""
+    place = -view[:3, :3].T @ view[:3, 3]
+    moved = view.copy()
+    moved[:3, 3] = -view[:3, :3] @ (MIDDLE + (place - MIDDLE) * factor)
+    return moved
+
+
+def test_cameras_that_disagree_make_one_surface_and_not_a_shell_each():
+    """A reach of four voxels shows the innermost shell, in pieces; the spheres' mean is 0.925."""
+    views = cameras(16)
+    depths = spheres(views, np.tile([0.85, 1.0, 0.9, 0.95], 4))
+    places = [places_of(camera, depth) for camera, depth in zip(views, depths, strict=True)]
+    grid = grid_of(np.concatenate(places), 96)
+    apart = disagreement(list(zip(views[::2], depths[::2], strict=True)), places)
+    assert 0.05 < apart < 0.15
+    found = []
+    for reach in (None, reach_of(apart, grid)):
+        volume = Distances(grid, reach)
+        for camera, depth in zip(views, depths, strict=True):
+            volume.add(camera, depth)
+        vertices, triangles = surface(volume.inside(), grid, 0.0, volume.seen())
+        radius = np.median(np.linalg.norm(vertices - MIDDLE, axis=1))
+        found.append((radius, without_fragments(vertices, triangles)[2]))
+    (inner, many), (between, few) = found
+    assert inner < 0.87 and 0.89 < between < 0.95
+    assert many > 2 * few
+
+
+def test_cameras_that_agree_keep_the_reach_of_four_voxels():
+    views = cameras(16)
+    depths = [depth_of_sphere(camera) for camera in views]
+    places = [places_of(camera, depth) for camera, depth in zip(views, depths, strict=True)]
+    grid = grid_of(np.concatenate(places), 28)
+    apart = disagreement(list(zip(views[::2], depths[::2], strict=True)), places)
+    assert reach_of(apart, grid) == 4 * grid.spacing[0]
+    assert disagreement([(views[0], depths[0])], places[:1]) == 0
+
+
+def test_small_pieces_are_left_out():
+    """Two tetrahedra of 400 copies' worth of triangles, and a lone triangle."""
+    corners = np.array([[0, 1, 2], [0, 3, 1], [0, 2, 3], [1, 3, 2]])
+    large = np.tile(corners, (100, 1))
+    triangles = np.concatenate([large, corners + 4, [[8, 9, 10]]]).astype(np.uint32)
+    vertices = np.arange(33, dtype=np.float32).reshape(11, 3)
+    found, kept, dropped = without_fragments(vertices, triangles)
+    np.testing.assert_array_equal(found, vertices[:8])
+    np.testing.assert_array_equal(kept, triangles[:-1])
+    assert dropped == 1
 
 
 @pytest.mark.parametrize("voxels", [18, 19, 37, 96])
@@ -191,6 +259,21 @@ def test_a_mesh_of_flat_splats_lies_before_their_surface_by_a_third_of_their_wid
     vertices = np.array([line.split()[1:4] for line in lines if line.startswith("v ")], float)
     away = np.linalg.norm(vertices - MIDDLE, axis=1)
     assert np.median(away) == pytest.approx(1.035, abs=0.005)
+
+
+def test_depths_that_disagree_are_told(ball, capsys):
+    """A fog of splats as deep as a third of the sphere, and one splat far before it."""
+    scene = SplatScene.load("ball.ply")
+    shares = np.random.default_rng(0).uniform(0.65, 1, (len(scene), 1)) / 0.95
+    shares[7] = 2.2
+    fog = np.full(len(scene), -0.5, np.float32)
+    fog[7] = 5
+    means = (MIDDLE + (scene.means - MIDDLE) * shares).astype(np.float32)
+    replace(scene, means=means, logit_opacities=fog).save("fog.ply")
+    words = ["--capture", str(ball / "transforms.json"), "--voxels", "48", "--to", "obj"]
+    assert main(["export", "fog.ply", "--mesh", "--out", "fog.obj", *words]) == 0
+    told = " ".join(capsys.readouterr().err.split())
+    assert "depths disagree by 0." in told and "were left out" in told
 
 
 def test_a_grid_without_room_is_refused_before_it_is_made(ball, monkeypatch, capsys):

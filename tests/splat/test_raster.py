@@ -1,5 +1,7 @@
 """Compositing and its gradient: against the twin, finite differences, and laws."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scenes import numbers_of, random_scene
@@ -39,6 +41,28 @@ def draw(device, scene, settings, background=None):
         background = device.array(background)
     result = rasterize(device, splats, lists, scene.size, settings=settings, background=background)
     return splats, lists, result
+
+
+@pytest.mark.parametrize("kind", ["light", "smooth", "low cap"])
+@pytest.mark.parametrize("channels", [1, 4, 9])
+def test_the_median_is_the_feature_of_the_splat_that_leaves_half(device, kind, channels):
+    settings, scene = KINDS[kind], random_scene(300, SIZE, channels=channels)
+    splats, lists = scene.upload(device)
+    drawn = {"settings": settings, "background": device.array(np.zeros(channels, np.float32))}
+    found = rasterize(device, replace(splats, median=True), lists, SIZE, **drawn)
+    usual = rasterize(device, splats, lists, SIZE, **drawn)
+    for name in ("transmittance", "last"):
+        given, wanted = (device.get(getattr(each, name)) for each in (found, usual))
+        np.testing.assert_array_equal(given, wanted)
+    image, sums = device.get(found.image), device.get(usual.image)
+    np.testing.assert_array_equal(image[..., :-1], sums[..., :-1])
+    rules = replace(rules_of(settings), median=True)
+    screen, features = (array.astype(float) for array in (scene.screen, scene.features))
+    wanted, left = raster(screen, features, scene.entries, scene.starts, SIZE, rules)
+    # Rounding may put a splat on the other side of a half.
+    same = np.isclose(image[..., -1], wanted[..., -1], atol=1e-6)
+    assert same.mean() > 0.995
+    assert (left < 0.5).mean() > 0.5
 
 
 def gradient(device, scene, settings, grad_image, grad_transmittance, background=None):

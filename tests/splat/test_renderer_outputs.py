@@ -5,6 +5,7 @@ import pytest
 from projection_scenes import camera_of, random_splats
 
 from rift_cl.errors import InputError, ShapeError
+from rift_cl.geometry import Camera
 from rift_cl.splat.renderer import Renderer
 from rift_cl.splat.settings import SplatSettings
 from rift_cl.splat.splats import Splats
@@ -86,6 +87,27 @@ def test_depth_of_one_splat_is_its_own(device):
     wanted = device.get(frame.projection.depths)[0]
     np.testing.assert_allclose(depth[alpha > 0.01], wanted, rtol=1e-4)
     assert not depth[alpha == 0].any()
+
+
+@pytest.mark.parametrize("modes", [0, 9])
+@pytest.mark.parametrize(("opacity", "wanted"), [(0.3, 4.0), (0.7, 2.0)])
+def test_median_depth_is_that_of_what_hides_half(device, modes, opacity, wanted):
+    """Two walls, at 2 and at 4 from the camera, of which the farther one is opaque."""
+    given = {"means": [[0, 0, 2], [0, 0, 4]], "quats": [[1, 0, 0, 0]] * 2}
+    given |= {"scales": [[9, 9, 0.01], [18, 18, 0.01]], "opacities": [opacity, 0.99]}
+    if modes:
+        given["shape_modes"] = np.zeros((2, modes))
+    camera = Camera((24, 32), [[30, 0, 16], [0, 30, 12], [0, 0, 1]], np.eye(4))
+    renderer, splats = Renderer(device=device), Splats.upload(device, **given, colors=np.eye(2))
+    frame = renderer.forward(splats, camera, depth="median")
+    image = device.get(frame.image)
+    assert image.shape == (24, 32, 3)
+    np.testing.assert_allclose(image[..., 2], wanted, rtol=1e-6)
+    usual = device.get(renderer.forward(splats, camera, depth="expected").image)
+    assert np.array_equal(image[..., :2], usual[..., :2])
+    assert ((usual[..., 2] > 2.5) & (usual[..., 2] < 3.5)).all()
+    with pytest.raises(InputError, match="no gradient"):
+        renderer.backward(frame, frame.image)
 
 
 @pytest.mark.full

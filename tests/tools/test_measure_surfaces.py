@@ -62,9 +62,16 @@ def test_views_beyond_are_the_highest(measure, tmp_path):
 def test_every_variant_is_taken_and_what_was_found_is_told(measure):
     for values in measure.VARIANTS.values():
         FitPhotosSettings.of(Path("capture"), Path("out"), **values).check()
-    ball = {"what": "ball", "psnr": 30.0, "cpu_s": 9.0, "depth": 0.25, "normals": 31.0}
+    ball = {
+        "what": "ball",
+        "psnr": 30.0,
+        "cpu_s": 9.0,
+        "expected": 0.25,
+        "median": 0.12,
+        "normals": 31.0,
+    }
     found = [{"variant": "defaults", **ball}]
     found.append({"variant": "flatness", "what": "lego", "psnr": 28.0, "cpu_s": 8.0})
     first, second = measure.tables(found)
-    assert first.rows[0][:4] == ("defaults", "0.250", "31.0", "30.00, 9 s")
-    assert first.rows[1][4] == "28.00, 8 s" and len(second.rows) == 2
+    assert first.rows[0][:5] == ("defaults", "0.250", "0.120", "31.0", "30.00, 9 s")
+    assert first.rows[1][5] == "28.00, 8 s" and len(second.rows) == 2

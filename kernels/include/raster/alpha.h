@@ -30,6 +30,14 @@
 #define MODAL 0
 #endif
 
+/* Whether the last channel is no sum but the median: the value of the splat that leaves half of the
+ * light or less, or of the last one that counts where none does. For depths, in which the mean of what
+ * lies before a surface and behind it is the depth of nothing. */
+#ifndef MEDIAN
+#define MEDIAN 0
+#endif
+#define SUMS (CHANNELS - MEDIAN)
+
 #define SMOOTH_EDGE 4.5f
 /* What sigma is multiplied with to be an exponent of two. */
 #define TO_POWER -1.44269504f

@@ -32,6 +32,8 @@ from rift_cl.splat.voxels import voxelise
 # reach so many standard deviations.
 _FAINT, _REACH = 1e-3, 3.0
 _FEWEST, _MOST = 8, 2048
+# Pieces of a mesh of photographs with less than this share of the largest one's triangles go.
+_FRAGMENT = 0.01
 # The axis of rotation, z, is glTF's y.
 _UPRIGHT = np.array([[1.0, 0, 0], [0, 0, 1], [0, -1, 0]])
 
@@ -90,9 +92,18 @@ class MeshExport:
         if self._depth is not None:
             yield from self._depth.run(self.device)
             self.grid = self._depth.grid
-            found = surface(self._depth.inside, self.grid, 0.0, self._depth.seen)
+            vertices, triangles = surface(self._depth.inside, self.grid, 0.0, self._depth.seen)
+            vertices, whole, dropped = without_fragments(vertices, triangles)
             yield Report(1, 2, "steps: surface")
-            yield self._written(*found, f"from {len(self._depth.cameras)} depth maps", 2)
+            if self._depth.doubt:
+                self.announce(self._depth.doubt)
+            if dropped:
+                self.announce(
+                    f"{dropped} pieces with less than {_FRAGMENT:.0%} of the largest one's "
+                    f"triangles were left out, {len(triangles) - len(whole)} triangles of "
+                    f"{len(triangles)}"
+                )
+            yield self._written(vertices, whole, f"from {len(self._depth.cameras)} depth maps", 2)
             return
         # The variance of a voxel's box along each axis: samples are means over voxels.
         dilation = self.grid.spacing[0] ** 2 / 12
@@ -170,6 +181,33 @@ def surface(
     # In (z, y, x) its triangles are seen clockwise; (x, y, z) is a reflection of that.
     places = (vertices * grid.spacing + first)[:, ::-1]
     return np.ascontiguousarray(places, np.float32), triangles.astype(np.uint32)
+
+
+def without_fragments(
+    vertices: NDArray[np.float32], triangles: NDArray[np.uint32]
+) -> tuple[NDArray[np.float32], NDArray[np.uint32], int]:
+    """A mesh without its small pieces, such as splats leave that float before a surface.
+
+    Args:
+        vertices: (V, 3).
+        triangles: (T, 3), one or more.
+
+    Returns:
+        The vertices and the triangles of pieces with a hundredth of the largest one's triangles or
+        more, and how many pieces were left out.
+    """
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+
+    ends = triangles[:, [0, 1, 1, 2]].reshape(-1, 2).T.astype(np.int64)
+    joined = coo_array((np.ones(ends.shape[1], bool), tuple(ends)), shape=(len(vertices),) * 2)
+    count, of_vertex = connected_components(joined, directed=False)
+    of_triangle = of_vertex[triangles[:, 0]]
+    sizes = np.bincount(of_triangle, minlength=count)
+    large = sizes >= _FRAGMENT * sizes.max()
+    kept = triangles[large[of_triangle]]
+    used, kept = np.unique(kept, return_inverse=True)
+    return vertices[used], kept.reshape(-1, 3).astype(np.uint32), int(count - large.sum())
 
 
 def _grid(scene: SplatScene, voxels: int) -> Grid:

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from rift_cl.commands.pictures.small_looks import small_looks
 from rift_cl.geometry import Camera
-from rift_cl.splat.renderer import Renderer
+from rift_cl.splat.renderer import DepthKind, Renderer
 from rift_cl.splat.splats import Splats
 
 Floats = NDArray[np.float32]
@@ -28,9 +28,11 @@ _SOLID = 0.5
 LEAST_ALPHA = 1 / 255
 
 
-def depth_and_alpha(renderer: Renderer, splats: Splats, camera: Camera) -> tuple[Floats, Floats]:
-    """Expected depth and alpha, (height, width) each."""
-    image, seen = renderer.picture(splats, camera, depth="expected")
+def depth_and_alpha(
+    renderer: Renderer, splats: Splats, camera: Camera, kind: DepthKind = "expected"
+) -> tuple[Floats, Floats]:
+    """Depth and alpha, (height, width) each."""
+    image, seen = renderer.picture(splats, camera, depth=kind)
     return image[..., -1], np.clip(1 - seen, 0, 1)
 
 

@@ -12,13 +12,18 @@ from rift_cl.geometry import Camera
 LOOKS, _EDGE = 8, 64
 
 
-def small_looks(cameras: Sequence[Camera]) -> list[Camera]:
-    """Evenly spaced ones of the cameras, with pictures of a size that takes no time to draw."""
-    return [_small(cameras[number]) for number in evenly(len(cameras), LOOKS)]
+def small_looks(cameras: Sequence[Camera], edge: int = _EDGE) -> list[Camera]:
+    """Evenly spaced ones of the cameras, with pictures of a size that takes no time to draw.
+
+    Args:
+        cameras: all of them.
+        edge: pixels of a picture's longer edge at most.
+    """
+    return [_small(cameras[number], edge) for number in evenly(len(cameras), LOOKS)]
 
 
-def _small(camera: Camera) -> Camera:
-    share = min(1.0, _EDGE / max(camera.size))
+def _small(camera: Camera, edge: int) -> Camera:
+    share = min(1.0, edge / max(camera.size))
     return resized(
         camera, (max(1, round(share * camera.height)), max(1, round(share * camera.width)))
     )
