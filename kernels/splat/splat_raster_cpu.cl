@@ -152,8 +152,8 @@ static int draw_block(
             color[v][n] = color[v][n] + found[j][v] * color_seen(batch, &s, k, n, within[v]);
 #if MEDIAN
         UNROLL for (int v = 0; v < VECTORS; v++) {
-          const lanes_int before = (found[j][v] > 0) & (left[v] > 0.5f);
-          color[v][SUMS] = before ? color_seen(batch, &s, k, SUMS, within[v]) : color[v][SUMS];
+          const lanes_int shown = (found[j][v] > 0) & (left[v] > 0.5f);
+          color[v][SUMS] = shown ? color_seen(batch, &s, k, SUMS, within[v]) : color[v][SUMS];
           left[v] = left[v] - found[j][v];
         }
 #endif
