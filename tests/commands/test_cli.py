@@ -10,6 +10,7 @@ import tyro
 from rift_cl.commands.cli import COMMANDS, main
 from rift_cl.commands.options import gathered, option_groups, shown_options
 from rift_cl.commands.runner import command
+from rift_cl.errors import InputError
 
 # What the command line and one class of settings need: far below what any job loads.
 MOST_MODULES = 24
@@ -154,10 +155,20 @@ def test_what_few_fits_need_is_listed_for_experts(job):
 
 def test_a_list_that_is_given_twice_is_one_list():
     settings = COMMANDS["plan"].settings_class()
-    twice = ["--views", "3", "--camera", "a", "b", "--seed", "-1", "--camera=c", "--views", "4"]
-    once = ["--views", "3", "--seed", "-1", "--views", "4", "--camera", "a", "b", "c"]
+    twice = ["--views", "3", "--camera", "a", "b", "--seed", "-1", "--camera=c", "--overwrite"]
+    once = ["--views", "3", "--seed", "-1", "--overwrite", "--camera", "a", "b", "c"]
     assert gathered(twice, settings) == once
     assert gathered(once, settings) == once
+
+
+def test_one_of_several_names_is_given_once():
+    settings = COMMANDS["fit photos"].settings_class()
+    with pytest.raises(InputError, match=r"--preset is given 2 times"):
+        gathered(["a", "--preset", "surface", "--preset=lobes"], settings)
+    with pytest.raises(InputError, match=r"--homogenise-by is given 3 times"):
+        gathered(["--homogenise-by", "ramp", *["--homogenise_by=ramp"] * 2], settings)
+    later = ["a", "--dry-run", "--dry-run", "--steps", "5", "--steps", "6"]
+    assert gathered(later, settings) == later
 
 
 def test_a_switch_that_is_on_is_turned_off_by_its_negative():
