@@ -89,7 +89,7 @@ class RepeatableRun(RunOptions):
     config: Auto[Path] = None
     """config.json of an earlier run of this command, which is repeated with every value that was
     decided in it. With further options, the options of that run become the defaults of this one,
-    and what was left open is decided anew."""
+    and what was left open is decided anew. Default: none."""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -141,6 +141,14 @@ def test_help_stands_in_groups_without_negative_twins(capsys):
     assert "--no-" not in shown and "(default: None)" not in shown
 
 
+def test_help_shows_numbers_in_four_digits(capsys):
+    with pytest.raises(SystemExit):
+        main(["fit", "photos", "--help"])
+    shown = " ".join(capsys.readouterr().out.replace("\u2502", " ").split())
+    assert "(default: 0.07143)" in shown and "(default: 1e+10)" in shown
+    assert not re.search(r"\d{5,}\.\d|\.\d{8,}", shown)
+
+
 @pytest.mark.parametrize("job", ["fit photos", "fit xray"])
 def test_what_few_fits_need_is_listed_for_experts(job):
     groups = {}
