@@ -337,7 +337,8 @@ def _fitted(job: Any, table: Any, output: Output) -> bool:
         done = ran(job, job.settings, output)
     if done:
         columns, rows, caption = table.score_table(job.metrics)
-        print_table(columns, rows, caption=caption)
+        if rows:  # None where nothing was held out.
+            print_table(columns, rows, caption=caption)
     return done
 
 

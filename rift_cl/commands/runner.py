@@ -153,7 +153,7 @@ class _Entry(NamedTuple):
         above, dot, last = option.name.replace("_", "-").rpartition(".")
         negated = option.default is True and not twins
         name = above + dot + ("no-" if negated else "") + last
-        hint = "(on by default; this option turns it off)" if negated else None
+        hint = "(on by default; this option turns it off)" if negated else _hint_of(option)
         taken = _metavar_of(option.kind)
         mark = tyro.conf.arg(name=name, help=option.help, help_behavior_hint=hint, metavar=taken)
         kind: Any = Annotated[option.kind, mark]
@@ -164,6 +164,15 @@ class _Entry(NamedTuple):
         """What was given for it, or its default."""
         found = getattr(part, self.field)
         return not found if self.negated else found
+
+
+def _hint_of(option: ShownOption) -> str | None:
+    """The default of a number, for people: 1 / 14 in four digits; None leaves others to tyro."""
+    kind = option.kind
+    while get_origin(kind) is Annotated:
+        kind = get_args(kind)[0]
+    number = kind is float and isinstance(option.default, float)
+    return f"(default: {option.default:.4g})" if number else None
 
 
 def _metavar_of(kind: Any) -> str | None:

@@ -41,8 +41,8 @@ class SplatSettings:
     """Variance added to every splat on the screen, in square pixels. 0.3 blurs small images; 0.05
     to 0.1 suits cameras at one distance."""
     tile: AutoExpert[int] = None
-    """Edge of a tile in pixels: 8, 16 or 32. If not given, 32 on a CPU where an image has 64 such
-    tiles or more, else 16."""
+    """Edge of a tile in pixels: 8, 16 or 32. Default: 32 on a CPU where an image has 64 such
+    tiles or more, otherwise 16."""
     alpha_cap: Expert[float] = 0.99
     """Largest alpha of one splat, above 0 and below 1."""
     antialiased: bool = False

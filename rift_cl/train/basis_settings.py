@@ -53,7 +53,7 @@ class BasisSettings:
     # Modes of orders 1 and 2 of a shape do nearly what a shift and another covariance do, and
     # polynomials of colours have no bound: without it they wander where nothing holds them.
     ridge: Expert[float] = 1e-3
-    """Weight in the loss of the modes' squares, a mean over splats."""
+    """Weight in the loss of the sum of the modes' squares, averaged over splats."""
 
     def __post_init__(self) -> None:
         """Check every number's range, and that they agree."""

@@ -36,9 +36,10 @@ class OctaveSettings:
     count: Annotated[int | None, arg(name="octaves", prefix_name=False, help_behavior_hint="")] = (
         None
     )
-    """Number of times that images are halved at first, each of which leaves out an octave of
-    their frequencies until the residual is smaller than what that octave holds (0 = full size from
-    the first step on). Default: as many as leave 8,000 pixels, of images above 250,000."""
+    """Number of times that images are halved at first (0 = full size from the first step on). Each
+    halving leaves out the highest octave of their frequencies, and ends when the residual is
+    smaller than what that octave holds. Default: for images of 250,000 pixels and more, as often
+    as leaves 8,000 pixels, otherwise 0."""
     last: Expert[float] = 0.6
     """Fraction of the run after which images have their full size at the latest; images that are
     halved twice end after half of that, and so on."""

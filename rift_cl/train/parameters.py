@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -173,14 +173,10 @@ class Parameters:
         """Some of these splats with their moments, by index or mask; see ``replaced``.
 
         Raises:
-            InputError: a mask is one of whole numbers, which would be read as indices.
+            InputError: a mask has not a value for each splat, or is one of whole numbers, which
+                would be read as indices; or an index is that of no splat.
         """
-        like_mask = rows.dtype.kind in "iu" and len(rows) == len(self) > 2
-        if like_mask and set(np.unique(rows).tolist()) <= {0, 1}:
-            raise InputError(
-                "Parameters.selected: a mask of whole numbers would be read as indices, of splats "
-                "0 and 1 alone: give one of bool, mask.astype(bool)"
-            )
+        _check_rows(rows, len(self))
         groups = ({name: array[rows] for name, array in group.items()} for group in self.host())
         return self.replaced(*groups)
 
@@ -370,6 +366,26 @@ class Parameters:
         """Compute the rendered splats again, after arrays of ``raw`` were replaced."""
         self.drawn = _undrawn(self.device, self.raw, self.environment)
         self.activate()
+
+
+def _check_rows(rows: NDArray[Any], count: int) -> None:
+    """Check what selects some of ``count`` splats; see ``Parameters.selected``."""
+    kind, wanted = rows.dtype.kind, f"wanted a mask of bool, ({count},), or indices below {count}"
+    if rows.ndim != 1 or kind not in "biu" or (kind == "b" and len(rows) != count):
+        raise InputError(
+            f"Parameters.selected: rows has type {rows.dtype} and shape {rows.shape}, {wanted}"
+        )
+    if kind == "b":
+        return
+    if len(rows) == count > 2 and set(np.unique(rows).tolist()) <= {0, 1}:
+        raise InputError(
+            "Parameters.selected: a mask of whole numbers would be read as indices, of splats "
+            "0 and 1 alone: give one of bool, mask.astype(bool)"
+        )
+    if len(rows) and not -count <= rows.min() <= rows.max() < count:
+        raise InputError(
+            f"Parameters.selected: rows has indices from {rows.min()} to {rows.max()}, {wanted}"
+        )
 
 
 def _moments(

@@ -42,6 +42,7 @@ from rift_cl.train.settings import TrainSettings
 from rift_cl.train.start.points import scene_extent, scene_size
 from rift_cl.train.state_schema import check_state
 from rift_cl.train.strategy import Strategy, TrainingRun
+from rift_cl.train.strategy.unkept import UnkeptAttributes
 from rift_cl.train.surface_settings import SurfacePenalties
 
 # Steps between two reports; the loss comes to the host for each.
@@ -140,6 +141,7 @@ class Trainer:
                 f"{kind}.begin: gave {self.strategy!r}, wanted a Strategy, whose own __init__ "
                 "calls super().__init__(run)"
             )
+        self._unkept: UnkeptAttributes | None = UnkeptAttributes(self.strategy)
         rendering = self.strategy.render_settings(rendering or SplatSettings())
         if all(camera.model != "ortho" for camera in pictures.cameras):
             rendering = rendering.for_scene(self.size)
@@ -337,7 +339,7 @@ class Trainer:
             "raw": raw,
             "first": first,
             "second": second,
-            "strategy": self.strategy.state(),
+            "strategy": self._strategy_state(),
             "loss": self.loss.state(),
         }
         if parameters.environment is not None:
@@ -349,6 +351,20 @@ class Trainer:
         for name, part in self._parts().items():
             groups[name] = part.state()
         return {"step": np.array(parameters.step), **_flattened(groups)}
+
+    def _strategy_state(self) -> Group:
+        """The strategy's state, and a warning, once, where it seems to be forgotten."""
+        state = self.strategy.state()
+        changed = self._unkept.changed() if self._unkept and not state else []
+        if changed:
+            kind, self._unkept = type(self.strategy).__name__, None
+            warnings.warn(
+                f"{kind}: {' and '.join(changed)} changed since the fit began, and {kind}.state() "
+                "keeps nothing: a resumed fit begins with other values and may give other splats. "
+                "Keep them by state() and restore(), or compute them from parameters.step",
+                stacklevel=3,
+            )
+        return state
 
     def _parts(self) -> dict[str, Any]:
         """What a run has besides splats, strategy and loss, by its name in a state."""

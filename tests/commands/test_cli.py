@@ -10,6 +10,7 @@ import tyro
 from rift_cl.commands.cli import COMMANDS, main
 from rift_cl.commands.options import gathered, option_groups, shown_options
 from rift_cl.commands.runner import command
+from rift_cl.errors import InputError
 
 # What the command line and one class of settings need: far below what any job loads.
 MOST_MODULES = 24
@@ -140,6 +141,14 @@ def test_help_stands_in_groups_without_negative_twins(capsys):
     assert "--no-" not in shown and "(default: None)" not in shown
 
 
+def test_help_shows_numbers_in_four_digits(capsys):
+    with pytest.raises(SystemExit):
+        main(["fit", "photos", "--help"])
+    shown = " ".join(capsys.readouterr().out.replace("\u2502", " ").split())
+    assert "(default: 0.07143)" in shown and "(default: 1e+10)" in shown
+    assert not re.search(r"\d{5,}\.\d|\.\d{8,}", shown)
+
+
 @pytest.mark.parametrize("job", ["fit photos", "fit xray"])
 def test_what_few_fits_need_is_listed_for_experts(job):
     groups = {}
@@ -154,10 +163,20 @@ def test_what_few_fits_need_is_listed_for_experts(job):
 
 def test_a_list_that_is_given_twice_is_one_list():
     settings = COMMANDS["plan"].settings_class()
-    twice = ["--views", "3", "--camera", "a", "b", "--seed", "-1", "--camera=c", "--views", "4"]
-    once = ["--views", "3", "--seed", "-1", "--views", "4", "--camera", "a", "b", "c"]
+    twice = ["--views", "3", "--camera", "a", "b", "--seed", "-1", "--camera=c", "--overwrite"]
+    once = ["--views", "3", "--seed", "-1", "--overwrite", "--camera", "a", "b", "c"]
     assert gathered(twice, settings) == once
     assert gathered(once, settings) == once
+
+
+def test_one_of_several_names_is_given_once():
+    settings = COMMANDS["fit photos"].settings_class()
+    with pytest.raises(InputError, match=r"--preset is given 2 times"):
+        gathered(["a", "--preset", "surface", "--preset=lobes"], settings)
+    with pytest.raises(InputError, match=r"--homogenise-by is given 3 times"):
+        gathered(["--homogenise-by", "ramp", *["--homogenise_by=ramp"] * 2], settings)
+    later = ["a", "--dry-run", "--dry-run", "--steps", "5", "--steps", "6"]
+    assert gathered(later, settings) == later
 
 
 def test_a_switch_that_is_on_is_turned_off_by_its_negative():

@@ -51,8 +51,9 @@ def metrics_of(folder):
 def test_a_fit_is_scored_as_it_scored_itself(capture, fitted, tmp_path, capsys):
     out = tmp_path / "scores"
     assert evaluate(fitted, out, capture, "--train", capture, "--hold-out", 4) == 0
-    printed = capsys.readouterr().out
-    assert "PSNR foreground" in printed and "report.html" in printed
+    told = capsys.readouterr()
+    assert "PSNR foreground" in told.out and "report.html" in told.out
+    assert "poses are those of the captures" in told.err
     said, found = metrics_of(fitted)["scores"]["held out"], metrics_of(out)
     assert found["eps2d"] == 0.2
     scores = found["scores"][capture.name]

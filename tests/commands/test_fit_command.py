@@ -123,3 +123,19 @@ def test_the_captures_own_lists_are_followed_unless_told_otherwise(capture, tmp_
     assert config["settings"]["hold_out"] is None
     assert fit(listed, tmp_path / "every", "--dry-run") == 0
     assert "6 photographs" in capsys.readouterr().out
+
+
+def test_a_list_of_no_frame_is_told_of_before_a_fit_that_scores_nothing(capture, tmp_path, capsys):
+    listed = tmp_path / "listed"
+    shutil.copytree(capture, listed)
+    path = listed / "transforms.json"
+    lists = {"val_filenames": ["06.png"]}  # misspelt
+    path.write_text(json.dumps(json.loads(path.read_text()) | lists))
+    words = ["fit", str(listed), "--out", str(tmp_path / "fit"), "--steps", "5", "--splats", "50"]
+    assert main([*words, "--dry-run"]) == 0
+    planned = " ".join(capsys.readouterr().out.replace("\u2502", " ").split())
+    assert "such as 06.png, belong to no frame" in planned
+    assert "Trained on 8 photographs, and none held out, by the capture's own" in planned
+    assert main(words) == 0
+    told = capsys.readouterr()
+    assert "and none held out" in told.err and "PSNR" not in told.out

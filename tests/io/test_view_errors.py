@@ -115,6 +115,28 @@ def test_a_mask_of_zeros_and_ones_is_no_black_one(tmp_path: Path) -> None:
         read_view(view)
 
 
+@pytest.mark.parametrize("label", [(255, 0, 0), (0, 0, 128), (2, 2, 2), (15, 15, 15)])
+def test_a_mask_of_labels_is_no_black_one(tmp_path: Path, label: tuple[int, ...]) -> None:
+    write_png(tmp_path / "a.png", np.zeros((HEIGHT, WIDTH, 3), np.uint8))
+    mask = np.zeros((HEIGHT, WIDTH, 3), np.uint8)
+    mask[2:] = label
+    write_png(tmp_path / "m.png", mask)
+    view = view_of(tmp_path / "a.png", tmp_path / "m.png")
+    with pytest.raises(FileFormatError, match=r"m\.png: .*mask"):
+        read_view(view)
+    mask[0] = 255  # where it is white, it tells what counts
+    write_png(tmp_path / "m.png", mask)
+    assert (read_view(view)[0, :, 3] == 1).all()
+
+
+def test_a_mask_may_be_dark_where_it_is_soft(tmp_path: Path) -> None:
+    write_png(tmp_path / "a.png", np.zeros((HEIGHT, WIDTH, 3), np.uint8))
+    codes = np.arange(HEIGHT * WIDTH, dtype=np.uint8).reshape(HEIGHT, WIDTH) % 120
+    write_png(tmp_path / "m.png", codes)
+    image = read_view(view_of(tmp_path / "a.png", tmp_path / "m.png"))
+    np.testing.assert_allclose(image[..., 3], codes / 255, atol=1e-6)
+
+
 @pytest.mark.parametrize("alpha", [0, 255])
 def test_a_mask_that_tells_nothing_by_colours_or_alpha(tmp_path: Path, alpha: int) -> None:
     write_png(tmp_path / "a.png", np.zeros((HEIGHT, WIDTH, 3), np.uint8))

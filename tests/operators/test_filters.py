@@ -279,6 +279,18 @@ def test_responses_that_are_no_ramp_are_doubted(device, function, said):
         fbp(A, white(6, 13), function)
 
 
+def test_a_response_may_change_the_frequencies_that_it_is_given():
+    def in_place(frequencies):
+        frequencies *= np.cos(frequencies)
+        frequencies[0] = 0
+        return frequencies
+
+    response = Response(in_place)
+    assert response.doubt(BINS, 1.0) is None
+    aside = Response(lambda f: in_place(f.copy()))
+    assert response.taps(BINS, 1.0).tobytes() == aside.taps(BINS, 1.0).tobytes()
+
+
 def test_a_cone_doubts_responses_as_parallel_beams_do(device):
     scan = Fan(np.linspace(0, 2 * np.pi, 8, endpoint=False), 13, 0.01, 2, 4)
     A = Projector(Grid((8, 8), 0.01), scan, device=device)

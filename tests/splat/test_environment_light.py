@@ -185,6 +185,18 @@ def test_a_mirror_shows_the_light_itself_and_a_rough_splat_its_mean():
     np.testing.assert_allclose(rough, np.broadcast_to(rough[:1], rough.shape), rtol=1e-3)
 
 
+@pytest.mark.parametrize("kappa", [1.0, 2.0, 30.0])
+def test_a_sphere_leaves_of_a_dull_lobe_what_its_closed_form_says(kappa):
+    """Over a plane, exp(s (t - 1)) has the integral 2 pi / s; a sphere has 1 - exp(-2 s) of it."""
+    lobes, axes = 64, environment_axes(4000)
+    lattice = lattice_sharpness(lobes)
+    reflectance = np.array([[50.0] * 3 + [-50.0] * 3 + [np.log(kappa)]])
+    light = np.zeros((lobes, 3))
+    found = reflected_light(np.array([[0, 0, 1.0]]), reflectance, light, axes).mean()
+    left = 1 - np.exp(-2 * lattice * kappa / (lattice + kappa))
+    assert found == pytest.approx(left * light_from(light, axes).mean(), rel=2e-3)
+
+
 def test_splats_without_a_meaning_reflect_nothing_and_spoil_nothing(device):
     values, bad = lit(40), lit(40)
     bad["normals"][3], bad["normals"][4, 1], bad["reflectance"][5, 2] = 0, np.nan, np.inf

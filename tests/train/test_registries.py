@@ -224,6 +224,22 @@ def test_a_mask_of_whole_numbers_is_not_read_as_indices(device):
         splats.selected(np.array([1, 0, 1]))
 
 
+@pytest.mark.parametrize(
+    ("rows", "said"),
+    [
+        (np.ones(2, bool), r"bool and shape \(2,\)"),
+        (np.ones((3, 1), bool), r"shape \(3, 1\)"),
+        (np.ones(3), "float64"),
+        (np.array([0, 3]), "from 0 to 3"),
+        (np.array([-4]), "from -4"),
+    ],
+)
+def test_rows_that_select_no_splats_are_refused(device, rows, said):
+    splats = Parameters.of(device, start_splats(np.eye(3)))
+    with pytest.raises(InputError, match=f"Parameters.selected: .*{said}"):
+        splats.selected(rows)
+
+
 def _trainer(device, settings):
     view = np.eye(4)
     view[2, 3] = 4

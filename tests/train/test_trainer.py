@@ -124,6 +124,52 @@ def test_a_strategy_that_wants_the_harmonics_gradient_has_it_and_the_same_bits(d
         assert all(first[name].tobytes() == second[name].tobytes() for name in GROUPS)
 
 
+class Counter(Strategy):
+    """Counts its steps in an attribute, which ``state`` holds if the class says so."""
+
+    keeps = False
+
+    def __init__(self, run):
+        super().__init__(run)
+        self.count, self.sizes, self.begun_with = 0, [], np.zeros(3)
+
+    def after_step(self, parameters, frame, gradients, learning_rate):
+        self.count += 1
+        self.sizes.append((len(parameters), np.ones(2)))
+        return parameters
+
+    def state(self):
+        return {"count": np.array(self.count)} if self.keeps else {}
+
+
+class KeptCounter(Counter):
+    keeps = True
+
+
+@dataclass(frozen=True)
+class Counts(StrategySettings):
+    kind: type[Strategy] = Counter
+
+    def begin(self, parameters, run):
+        return self.kind(run)
+
+
+def test_a_strategy_that_counts_and_keeps_no_count_is_warned_of_once(device):
+    trainer = trainer_of(device, replace(SETTINGS, strategy=Counts()))
+    trainer.state()
+    trainer.step()
+    with pytest.warns(UserWarning, match="Counter: count and sizes changed") as caught:
+        trainer.state()
+    assert len(caught) == 1
+    trainer.state()
+
+
+def test_a_strategy_that_keeps_its_count_is_not_warned_of(device):
+    trainer = trainer_of(device, replace(SETTINGS, strategy=Counts(KeptCounter)))
+    trainer.step()
+    assert trainer.state()["strategy.count"] == 1
+
+
 def test_every_picture_is_looked_at_once_before_any_is_again(device):
     trainer = trainer_of(device)
     order = [trainer.view_at(step) for step in range(24)]

@@ -9,8 +9,10 @@ the mirrored direction of the view:
     reflected = (tint + grazing tint (1 - |d . n|)^5) L(d),
 
 with the normal n and the sharpness kappa of the surface's own lobe: variances of Gaussians add
-(Wang et al. 2009), and w keeps their integrals. The last factor is Schlick's. Directions d lead
-from the camera to the splat; light comes from where r leads to.
+(Wang et al. 2009), and w keeps their integrals over a plane. Over the sphere 1 - exp(-2 s) of them
+is left, since a dull lobe ends where it meets itself: 0.86 where s is 1, 0.98 where it is 2. The
+last factor is Schlick's. Directions d lead from the camera to the splat; light comes from where r
+leads to.
 
 Of a splat the *reflectance* is 7 numbers: logits of the tint's three channels and of the grazing
 tint's, and ln kappa. Of the light there are natural logarithms of the radiance, so that nothing is

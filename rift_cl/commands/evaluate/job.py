@@ -197,7 +197,8 @@ class Evaluation:
         self.scores = {name: scores for name, scores in self.scores.items() if scores}
         if not self.scores:
             raise InputError(f"{self.scene.name}: every mask is black, there is nothing to score")
-        self.notes += [*self._refined(), *self._left_out(), *comparison_notes(self.scores)]
+        self.notes += [*self._pose_notes(), *self._exposure_notes(), *self._left_out()]
+        self.notes += comparison_notes(self.scores)
         self.metrics = {
             "splats": len(self.scene.splats),
             "eps2d": self.scene.rendering.eps2d,
@@ -226,19 +227,25 @@ class Evaluation:
         shown = " ".join(f"{value:.3g}" for value in color)
         return f"pictures of {name} are drawn over {shown}, {self._told or found}"
 
-    def _refined(self) -> list[str]:
-        """Sentences about what is fitted to the pictures that are scored."""
-        notes = []
-        if self.scene.refined("poses"):
-            own = "poses of the held-out photographs are those that the fit refined against them"
-            other = "poses are those of the captures, which the fit's may have moved away from"
-            notes.append(other if self.settings.captures else own)
-        if self.scene.refined("exposures"):
-            notes.append(
-                "a gain and an offset of each colour are fitted to each photograph, as the fit did;"
-                " 'as given' scores the splats without them"
-            )
-        return notes
+    def _pose_notes(self) -> list[str]:
+        """A sentence about whose poses the pictures are drawn with."""
+        refined = self.scene.refined("poses")
+        if self.settings.captures:
+            note = "poses are those of the captures, whose frame is taken for that of the splats"
+            moved = ", which the fit's poses may have moved away from" if refined else ""
+            return [note + moved]
+        if refined:
+            return ["poses of the held-out photographs are those that the fit refined against them"]
+        return []
+
+    def _exposure_notes(self) -> list[str]:
+        """A sentence about what of exposures is fitted to the pictures that are scored."""
+        if not self.scene.refined("exposures"):
+            return []
+        return [
+            "a gain and an offset of each colour are fitted to each photograph, as the fit did;"
+            " 'as given' scores the splats without them"
+        ]
 
     def _left_out(self) -> list[str]:
         """A sentence about pictures that a score has no meaning of."""

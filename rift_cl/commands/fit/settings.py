@@ -41,9 +41,9 @@ class FitOutput:
     """Most minutes between two checkpoints (0 = by steps alone); without effect if
     --checkpoint-every is 0."""
     resume: Annotated[bool, RUN] = False
-    """Resume from the last checkpoint in --out, to the same bits. With more --steps than before, a
-    fit is trained on with the learning rates, densification and cooldown of a fit of that many
-    steps, so that learning rates rise again before they fall."""
+    """Resume from the last checkpoint in --out, to the same bits. With more --steps than before,
+    the fit goes on with the learning rates, densification and cooldown of a fit of that many steps,
+    so that learning rates rise again before they fall."""
     view: bool = False
     """Show the fit in a browser on this machine while it runs."""
 

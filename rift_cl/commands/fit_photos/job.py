@@ -123,14 +123,13 @@ class Fit(FitRun[FitPhotosSettings]):
             }
         cameras = [camera_at(view, self.downscale) for view in self.training_views]
         largest = max(camera.height * camera.width for camera in cameras)
-        masks = sum(view.mask is not None for view in self.training_views)
+        notes = self._notes()
         return {
             "capture": str(self.source.path),
             "trained on": f"{len(self.training_views)} photographs",
             "held out": f"{len(self.test_views)} photographs",
-            **({"masks": f"{masks} photographs have one"} if masks else {}),
             "largest photograph": f"{largest} pixels, made smaller by {self.downscale}",
-            **({"notes": "; ".join(self.capture_notes)} if self.capture_notes else {}),
+            **({"notes": "; ".join(notes)} if notes else {}),
             "splats": self._splats,
             "device": self.device.name,
             **self._tried(self.source, largest),
@@ -397,8 +396,9 @@ class Fit(FitRun[FitPhotosSettings]):
         notes += self.capture_notes
         if self.hold_out is None:
             notes.append(
-                f"Trained on {len(self.training_views)} photographs, and {len(self.test_views)} "
-                "held out, by the capture's own lists; --hold-out 8, say, takes every 8th instead"
+                f"Trained on {len(self.training_views)} photographs, and "
+                f"{len(self.test_views) or 'none'} held out, by the capture's own lists; "
+                "--hold-out 8, say, takes every 8th instead"
             )
         if self.hold_out and not self.test_views:
             notes.append(

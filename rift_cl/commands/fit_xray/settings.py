@@ -34,10 +34,11 @@ class XrayInput:
     theta: Auto[str] = None
     """Name of the angles in the file. Default: that of the file's layout."""
     flats: Auto[str] = None
-    """Name of the frames without the sample; air or mean where there are none. Default: that of the
-    file's layout."""
+    """Name of the flat fields (no sample) in the file. Without flat fields, 'air' estimates the
+    incident beam of each view from the outermost bins at both ends, which must see only air, 'mean'
+    from the mean of the view. Default: that of the file's layout."""
     darks: Auto[str] = None
-    """Name of the frames without the beam. Default: that of the file's layout."""
+    """Name of the dark fields (no beam) in the file. Default: that of the file's layout."""
     image_key: AutoExpert[str] = None
     """Name of the array that says what each frame is, as in NXtomo. Default: that of the file's
     layout."""

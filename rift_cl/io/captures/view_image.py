@@ -37,6 +37,8 @@ _SHOWN = {
 _LOSSY, _HALF = (".jpg", ".jpeg"), 0.5
 # The code 1 of 8 bits, with room for rounding.
 _ONE_CODE = 1.01 / 255
+# So many greys in a dark mask, black among them, may be labels; one with soft edges has more.
+_LABELS = 32
 
 
 def read_view(
@@ -226,7 +228,8 @@ def _coverage(path: Path, budget: int | None) -> Image:
     Where alpha varies and colours do not, alpha is the mask; else their product is.
 
     Raises:
-        FileFormatError: the file is damaged, or nothing in it tells what counts.
+        FileFormatError: the file is damaged, or nothing in it tells what counts, as in one of
+            labels.
         NonFiniteError: it holds NaN or infinity.
     """
     header = read_picture_header(path)
@@ -245,7 +248,26 @@ def _coverage(path: Path, budget: int | None) -> Image:
     if path.suffix.lower() in _LOSSY:
         # Black and white come back as greys wherever an edge is near.
         return (mask > _HALF).astype(np.float32)
+    if not header.floating:
+        _check_no_labels(path, mask, colors)
     return np.clip(mask, 0, 1)
+
+
+def _check_no_labels(path: Path, mask: Image, colors: Image) -> None:
+    """Refuse a mask of labels, by colour or number, whose mean over channels tells of no cover.
+
+    Raises:
+        FileFormatError: no pixel is brighter than half, and the mask has colours or few greys.
+    """
+    most = float(mask.max())
+    if not 0 < most <= _HALF:
+        return
+    if np.ptp(colors, axis=-1).max() > _ONE_CODE or len(np.unique(mask)) <= _LABELS:
+        raise FileFormatError(
+            f"{path}: no pixel of the mask is brighter than {100 * most:.2g} % of white, as where "
+            "colours or numbers label what is shown; write 255 in all channels where the "
+            "photograph counts, 0 elsewhere"
+        )
 
 
 def _with_own_alpha(path: Path, mask: Image, alpha: Image) -> Image:

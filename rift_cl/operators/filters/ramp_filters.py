@@ -191,7 +191,8 @@ class Response:
 
     def _values(self, frequencies: Floats) -> Floats:
         try:
-            values = np.asarray(self.function(frequencies))
+            # A copy, since the function may change its argument, which is compared with the result.
+            values = np.asarray(self.function(frequencies.copy()))
         except TypeError as error:
             raise InputError(
                 f"filter {self._name}: its response cannot be called with an array of frequencies "

@@ -62,8 +62,8 @@ class Homogenisation:
     coarse, 0 to 4 (0 = none). Default: 0 for X-rays; for photographs 0.5, or 0 for fewer than
     40."""
     weight: Annotated[WeightKind, arg(name="homogenise-by", prefix_name=False)] = "ramp"
-    """What that exponent is of: the frequency (ramp), which suits evenly spaced views, or one over
-    the coverage of the frequency by all views (coverage)."""
+    """What is raised to the exponent of --homogenise: the frequency (ramp), which suits evenly
+    spaced views, or one over the coverage of the frequency by all views (coverage)."""
     noise_aware: Expert[bool] = True
     """Lower the exponent as the residual comes down to the noise of the images."""
     along_rows: Expert[bool] = False

@@ -36,10 +36,10 @@ class GrowthSettings(StrategySettings):
     last: float = 0.85
     """Fraction of the run after which the number of splats no longer grows."""
     growth: float = 0.05
-    """Fraction by which the number of splats grows at each relocation, up to the most that there
-    may be; more where the run is too short for it. 0 = the number stays."""
+    """Fraction by which the number of splats grows at each relocation, up to --splats; more
+    where the run is too short for it (0 = the number stays)."""
     full: float = 0.5
-    """Fraction of the run after which the most splats that there may be should be there."""
+    """Fraction of the run by which the number of splats should have grown to --splats."""
     min_opacity: float = 0.005
     """Opacity up to which a splat counts as transparent and is relocated."""
     opacity_penalty: float = 0.01

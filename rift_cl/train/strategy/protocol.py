@@ -180,7 +180,11 @@ class Strategy:
         yield self.run.steps - step, count
 
     def state(self) -> dict[str, NDArray[Any]]:
-        """What a checkpoint must hold besides parameters and settings: host arrays by name."""
+        """What a checkpoint must hold besides parameters and settings: host arrays by name.
+
+        All that changes from step to step belongs here, such as a count in an attribute: a
+        resumed run begins with the attributes of ``begin`` and what ``restore`` makes of this.
+        """
         return {}
 
     def restore(self, state: Mapping[str, NDArray[Any]]) -> None:

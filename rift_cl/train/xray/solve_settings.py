@@ -28,7 +28,7 @@ class SolveSettings:
     one before the first step and one after the last. Between them only positions and shapes are
     optimized (0 = none)."""
     views: Expert[int] = 64
-    """Most projections in a solve; of more, some are drawn by chance."""
+    """Largest number of projections in a solve; of more, so many are drawn at random."""
     iterations: Expert[int] = 2
     """Conjugate gradient iterations of a solve."""
     # Below 1e-6 float32 does not hold the answer.
