@@ -66,6 +66,28 @@ def test_values_tell_their_kind_or_leave_a_doubt(
     assert possible_kinds(sampled(values.astype("f4"), np.dtype("u2"))) == ("counts",)
 
 
+@pytest.mark.parametrize("beam", [3.6e4, 2e4])
+def test_numbers_below_zero_that_wrapped_are_told_from_hits(tmp_path: Path, beam: float) -> None:
+    """Darks that were subtracted without a sign, behind something dense."""
+    noise = 4 * np.sin(7.0 * np.arange(VIEWS * ROWS * BINS)).reshape(VIEWS, ROWS, BINS)
+    counts = np.rint(beam * np.exp(-lines(12)) + noise)
+    flats = np.full((3, ROWS, BINS), beam, "u2")
+
+    def told(values: np.ndarray) -> str:
+        path = hdf5(tmp_path / "scan.h5", data=values, white=flats, theta=DEGREES)
+        return " ".join(open_scan(path, dataset="data", flats="white", theta="theta").notes)
+
+    wrapped = counts.astype("i4").astype("u2")
+    assert (wrapped > 65000).any()
+    assert "underflow" in told(wrapped) and "zingers" not in told(wrapped)
+    whole = np.maximum(counts, 0).astype("u2")
+    assert "Doubt" not in told(whole)
+    hit, stuck = whole.copy(), whole.copy()
+    hit[:, :, ::7] = 65535
+    stuck[:, 1, 15] = 65530 + np.arange(VIEWS) % 5
+    assert "underflow" not in told(hit if beam > 3e4 else stuck)
+
+
 def random_views(random: np.random.Generator, shift: float, radius: float) -> np.ndarray:
     """Line integrals of up to four discs in nine views, the first of them apart by ``shift``."""
     t = np.linspace(-1, 1, 200)
