@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rift_cl.commands.inputs.beam_level import beam_level
+from rift_cl.commands.inputs.detector_rows import read_rows
 from rift_cl.io.scans.scan_file import ScanFile, ScanRows
 from rift_cl.reconstruct.preprocess.flatfield import Attenuation
 
@@ -49,7 +50,10 @@ def row_doubts(scan: ScanFile, row: int, found: Attenuation) -> list[str]:
     # Line integrals of others may be in any unit, and have no frames.
     if scan.kind == "attenuation":
         return _weak_beam(scan, lines)
-    frames = scan.read(row, row + 1)
+    rows = read_rows(scan, row, row + 1)
+    if rows.lost.all():
+        return []
+    frames = rows.frames
     told = _frames(frames) or _no_air(scan, lines, frames.flats is not None)
     # Counts over the mean of each view say nothing of the level of the beam.
     if frames.flats is not None or scan.kind == "transmission" or scan.background:

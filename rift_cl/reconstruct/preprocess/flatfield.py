@@ -18,6 +18,7 @@ an invented peak. One such column would otherwise be a ring, and one NaN a ruine
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -52,18 +53,21 @@ class Attenuation:
         starved_of_rows: samples of each row without a signal above the darks' noise, filled in the
             same way, (row,).
         dead_bins: bins of which a pixel was filled in some of the rows, ascending.
+        dead_rows: numbers of rows without a pixel that answers, which were filled from the rows on
+            either side, ascending.
     """
 
     projections: Floats
     dead_of_rows: Counts
     starved_of_rows: Counts
     dead_bins: tuple[int, ...] = ()
+    dead_rows: tuple[int, ...] = ()
 
     def of_row(self, row: int) -> Attenuation:
-        """Those of one row, which keeps its axis; bins are those of all rows."""
+        """Those of one row, which keeps its axis; bins and dead rows are those of all rows."""
         one = slice(row, row + 1)
         counts = self.dead_of_rows[one], self.starved_of_rows[one]
-        return Attenuation(self.projections[:, one], *counts, self.dead_bins)
+        return Attenuation(self.projections[:, one], *counts, self.dead_bins, self.dead_rows)
 
     @property
     def dead(self) -> int:
@@ -74,6 +78,17 @@ class Attenuation:
     def starved(self) -> int:
         """Samples without a signal above the darks' noise, filled in the same way."""
         return int(self.starved_of_rows.sum())
+
+
+def joined(parts: Sequence[Attenuation]) -> Attenuation:
+    """Those of rows that follow each other."""
+    return Attenuation(
+        np.concatenate([part.projections for part in parts], axis=1),
+        np.concatenate([part.dead_of_rows for part in parts]),
+        np.concatenate([part.starved_of_rows for part in parts]),
+        tuple(sorted({bin for part in parts for bin in part.dead_bins})),
+        tuple(row for part in parts for row in part.dead_rows),
+    )
 
 
 def attenuation(
@@ -130,6 +145,7 @@ def attenuation_without_flats(
     darks: Floats | None = None,
     *,
     incident: NDArray[np.float64] | None = None,
+    masked: NDArray[np.bool_] | None = None,
     first_row: int = 0,
 ) -> Attenuation:
     """Take -log of transmission, or of counts whose beam is a number for each view.
@@ -139,6 +155,7 @@ def attenuation_without_flats(
         darks: counts without the beam, (n, row, bin); zero if not given.
         incident: (angle,) the beam's counts, less the darks; 1 if not given, which leaves counts
             with line integrals that are off by one number in each view and row.
+        masked: (row, bin) pixels that hold nothing; they count as dead.
         first_row: number of the first row, for errors.
 
     Raises:
@@ -151,7 +168,28 @@ def attenuation_without_flats(
     beam = np.maximum(signal.max(axis=(0, 2)), 0)[:, None]
     scale = 1.0 if incident is None else float(np.mean(incident))
     faintest = np.maximum(_dark_noise(darks) / np.float32(scale), _FAINTEST * beam)
-    return _minus_log(signal, faintest, np.zeros(projections.shape[1:], np.bool_), first_row)
+    dead = np.zeros(projections.shape[1:], np.bool_) if masked is None else masked
+    return _minus_log(signal, faintest, dead, first_row)
+
+
+def without_masked(lines: Floats, masked: NDArray[np.bool_], *, first_row: int = 0) -> Attenuation:
+    """Line integrals as they are given, with pixels that hold nothing filled.
+
+    Args:
+        lines: line integrals (angle, row, bin); changed in place.
+        masked: (row, bin) pixels that hold nothing.
+        first_row: number of the first row, for errors.
+
+    Raises:
+        InputError: a row holds nothing else.
+    """
+    empty = np.zeros(lines.shape[1], np.int64)
+    if not masked.any():
+        return Attenuation(lines, empty, empty)
+    for row in np.flatnonzero(masked.any(axis=1)):
+        unknown = np.broadcast_to(masked[row], lines[:, row].shape)
+        _fill(lines[:, row], unknown, first_row + int(row))
+    return Attenuation(lines, masked.sum(axis=1), empty, _bins(masked))
 
 
 def without_stuck(found: Attenuation, angles: NDArray[np.float64]) -> Attenuation:
@@ -248,8 +286,11 @@ def _minus_log(
     if unknown.any():
         for row in np.flatnonzero(unknown.any(axis=(0, 2))):
             _fill(transmission[:, row], unknown[:, row], first_row + int(row))
-    dead_bins = tuple(map(int, np.flatnonzero(dead.any(axis=0))))
-    return Attenuation(transmission, dead_of_rows, starved_of_rows, dead_bins)
+    return Attenuation(transmission, dead_of_rows, starved_of_rows, _bins(dead))
+
+
+def _bins(dead: NDArray[np.bool_]) -> tuple[int, ...]:
+    return tuple(map(int, np.flatnonzero(dead.any(axis=0))))
 
 
 def _fill(lines: Floats, unknown: NDArray[np.bool_], row: int) -> None:
