@@ -168,7 +168,8 @@ def test_pixels_that_read_the_same_in_all_views_are_filled(stuck, value):
     broken = truth.copy()
     broken[:, 1, stuck] = value
     found = without_stuck(_found(broken), angles)
-    assert found.dead_bins == tuple(stuck) and found.dead_of_rows.tolist() == [0, len(stuck)]
+    assert found.dead_bins == found.stuck_bins == tuple(stuck)
+    assert found.dead_of_rows.tolist() == [0, len(stuck)]
     np.testing.assert_array_equal(found.projections[:, 0], truth[:, 0])
     assert np.abs(found.projections - truth).max() < 0.25 * truth.max()
     others = np.delete(np.arange(64), stuck)

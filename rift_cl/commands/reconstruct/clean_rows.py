@@ -124,7 +124,7 @@ class CleanRows:
         found = loaded.integrals
         dead, starved = found.dead_of_rows[counted], found.starved_of_rows[counted]
         lost = tuple(row for row in found.dead_rows if loaded.start <= row < loaded.stop)
-        return Attenuation(rows, dead, starved, found.dead_bins, lost)
+        return Attenuation(rows, dead, starved, found.dead_bins, found.stuck_bins, lost)
 
     @property
     def _halo(self) -> int:

@@ -53,6 +53,7 @@ class Attenuation:
         starved_of_rows: samples of each row without a signal above the darks' noise, filled in the
             same way, (row,).
         dead_bins: bins of which a pixel was filled in some of the rows, ascending.
+        stuck_bins: those of them that answer to the beam and read the same in all views.
         dead_rows: numbers of rows without a pixel that answers, which were filled from the rows on
             either side, ascending.
     """
@@ -61,13 +62,15 @@ class Attenuation:
     dead_of_rows: Counts
     starved_of_rows: Counts
     dead_bins: tuple[int, ...] = ()
+    stuck_bins: tuple[int, ...] = ()
     dead_rows: tuple[int, ...] = ()
 
     def of_row(self, row: int) -> Attenuation:
         """Those of one row, which keeps its axis; bins and dead rows are those of all rows."""
         one = slice(row, row + 1)
         counts = self.dead_of_rows[one], self.starved_of_rows[one]
-        return Attenuation(self.projections[:, one], *counts, self.dead_bins, self.dead_rows)
+        bins = self.dead_bins, self.stuck_bins
+        return Attenuation(self.projections[:, one], *counts, *bins, self.dead_rows)
 
     @property
     def dead(self) -> int:
@@ -87,6 +90,7 @@ def joined(parts: Sequence[Attenuation]) -> Attenuation:
         np.concatenate([part.dead_of_rows for part in parts]),
         np.concatenate([part.starved_of_rows for part in parts]),
         tuple(sorted({bin for part in parts for bin in part.dead_bins})),
+        tuple(sorted({bin for part in parts for bin in part.stuck_bins})),
         tuple(row for part in parts for row in part.dead_rows),
     )
 
@@ -210,7 +214,7 @@ def without_stuck(found: Attenuation, angles: NDArray[np.float64]) -> Attenuatio
     few = lines[np.linspace(0, len(lines) - 1, _ENOUGH_VIEWS).astype(int)]
     room = _STUCK * np.ptp(few, axis=(0, 2))[:, None]
     stuck = np.ptp(few, axis=0) <= room
-    dead, bins = found.dead_of_rows.copy(), set(found.dead_bins)
+    dead, bins = found.dead_of_rows.copy(), set(found.stuck_bins)
     for row in np.flatnonzero(stuck.any(axis=1)):
         varying = np.flatnonzero(~stuck[row])
         if not len(varying):
@@ -225,7 +229,9 @@ def without_stuck(found: Attenuation, angles: NDArray[np.float64]) -> Attenuatio
         _fill(lines[:, row], unknown, int(row))
         dead[row] += len(between)
         bins.update(map(int, between))
-    return replace(found, dead_of_rows=dead, dead_bins=tuple(sorted(bins)))
+    of_both = tuple(sorted(bins.union(found.dead_bins)))
+    told = tuple(sorted(bins))
+    return replace(found, dead_of_rows=dead, dead_bins=of_both, stuck_bins=told)
 
 
 def _mean_dark(projections: Floats, darks: Floats | None) -> Floats:
