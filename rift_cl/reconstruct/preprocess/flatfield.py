@@ -36,9 +36,11 @@ _FAINTEST = 1e-7
 # deviation of a pixel tells their spread; how many standard deviations an outlier is away, of which
 # a median deviation is one over 1.48.
 _ENOUGH_FRAMES, _MANY_FRAMES, _OUTLIER, _SIGMAS = 3, 5, 8.0, 1.48
-# Views and angle from which on a pixel that reads the same in all of them is told, and by how much
-# it may vary, as a share of what its row spans.
-_ENOUGH_VIEWS, _ENOUGH_TURN, _STUCK = 12, np.radians(150), 1e-6
+# Views and angle from which on a pixel that reads the same in all of them is told; by how much it
+# may vary, and how far from its neighbours it is in some view, as shares of what its row spans.
+_ENOUGH_VIEWS, _ENOUGH_TURN, _STUCK, _APART = 12, np.radians(150), 1e-6, 1e-3
+# What float32 leaves of the logarithm of a transmission near 1.
+_ROUNDED = 1e-6
 # Dark frames from which on their noise can be told.
 _ENOUGH_DARKS = 3
 
@@ -212,7 +214,8 @@ def without_stuck(found: Attenuation, angles: NDArray[np.float64]) -> Attenuatio
         return found
     # Most pixels are seen to vary by a few views alone.
     few = lines[np.linspace(0, len(lines) - 1, _ENOUGH_VIEWS).astype(int)]
-    room = _STUCK * np.ptp(few, axis=(0, 2))[:, None]
+    span = np.ptp(few, axis=(0, 2))
+    room = _STUCK * span[:, None]
     stuck = np.ptp(few, axis=0) <= room
     dead, bins = found.dead_of_rows.copy(), set(found.stuck_bins)
     for row in np.flatnonzero(stuck.any(axis=1)):
@@ -226,9 +229,14 @@ def without_stuck(found: Attenuation, angles: NDArray[np.float64]) -> Attenuatio
             continue
         unknown = np.zeros(lines.shape[::2], np.bool_)
         unknown[:, between] = True
-        _fill(lines[:, row], unknown, int(row))
-        dead[row] += len(between)
-        bins.update(map(int, between))
+        filled = lines[:, row].copy()
+        _fill(filled, unknown, int(row))
+        # Air without noise reads the same as well, and what its neighbours read but for rounding.
+        apart = np.abs(filled[:, between] - lines[:, row, between]).max(axis=0)
+        wrong = between[apart > max(_APART * span[row], _ROUNDED)]
+        lines[:, row, wrong] = filled[:, wrong]
+        dead[row] += len(wrong)
+        bins.update(map(int, wrong))
     of_both = tuple(sorted(bins.union(found.dead_bins)))
     told = tuple(sorted(bins))
     return replace(found, dead_of_rows=dead, dead_bins=of_both, stuck_bins=told)
