@@ -82,6 +82,12 @@ def reconstruct_scan(
     from rift_cl.commands.reconstruct.settings import ReconstructSettings
     from rift_cl.commands.reconstruct.volume import volume_path
 
+    if not isinstance(scan, (str, os.PathLike)):
+        # Runs that go on, and workers, open the scan again.
+        raise InputError(
+            f"scan is of the type {type(scan).__name__}, wanted the path of its file: save arrays "
+            "by numpy.savez('scan.npz', projections=..., angles=..., pitch=...) and name that file"
+        )
     with _folder(out, ReconstructSettings) as (folder, keep):
         given = {"scan": scan, "out": folder, **settings}
         job = reconstruction_of(_settings(given, "reconstruct", ReconstructSettings))

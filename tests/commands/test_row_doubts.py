@@ -10,6 +10,8 @@ import pytest
 
 import rift_cl as rift
 from rift_cl.commands.cli import main
+from rift_cl.commands.inputs.row_doubts import is_full_code, saturation
+from rift_cl.io.scans.scan_file import ScanRows
 
 VIEWS, BINS, BEAM, DARK = 120, 96, 20000, 100
 ANGLES = np.arange(VIEWS) * np.pi / VIEWS
@@ -81,6 +83,23 @@ def _saturated(lines):
     return {**made, "data": 4 * made["data"], "data_white": 4 * made["data_white"]}
 
 
+def _upper_bits(lines):
+    """Twelve bits, saturated in the brighter half of the beam and stored in the upper twelve."""
+    made = frames(lines)
+    counts = {name: np.minimum(values / 4, 4095) for name, values in made.items()}
+    counts["data_white"][:, :, BINS // 2 :] *= 0.5
+    counts["data"][:, :, BINS // 2 :] *= 0.5
+    return {name: 16 * values.astype(int) for name, values in counts.items()}
+
+
+def _clipped(lines):
+    """Counts that somebody cut at a number of no meaning."""
+    made = frames(lines)
+    for name in ("data", "data_white"):
+        made[name] = np.minimum(made[name], 19700)
+    return made
+
+
 def _two_flats(lines):
     made = frames(lines)
     made["data_white"][4:] = 0.7 * (made["data_white"][4:]) + 0.3 * DARK
@@ -118,6 +137,8 @@ WRONG = {
         "the flats read two levels, .* and .* above the darks, and nothing tells when",
     ),
     "weaker beam": (lambda lines: frames(lines, 0.7 * BEAM), "ends of the detector read 0.35"),
+    "upper bits": (_upper_bits, "[0-9]+ % of the .* read 65520"),
+    "clipped": (_clipped, "[0-9]+ % of the .* read 19700"),
     "saturated": (_saturated, "100 % of the detector's pixels read 65535"),
 }
 
@@ -227,3 +248,18 @@ def test_a_fit_of_xrays_says_what_was_found(lines, tmp_path, capsys):
     assert "The rotation axis was found at bin" in told and "brighter than the open beam" in told
     page = (tmp_path / "fit" / "report.html").read_text()
     assert "The rotation axis was found at bin" in page
+
+
+def test_codes_that_detectors_count_to():
+    assert all(is_full_code(float(code)) for code in (255, 4095, 65520, 65535, 2**24 - 2**8))
+    assert not any(is_full_code(float(code)) for code in (0, 1, 127, 4095.5, 4096, 30100, 32768))
+
+
+def test_few_photons_and_synthetic_counts_are_not_saturated():
+    """Few counts have few values, and noise-free air is bright alike."""
+    random = np.random.default_rng(0)
+    few = [random.poisson(0.5, (n, 1, 20)).astype(np.float32) for n in (9, 3)]
+    air = np.full((40, 1, 20), 30100, np.float32)
+    air[:, :, 5:15] = 9000.0
+    for projections, flats in (few, (air, air[:3] * 0 + 30100)):
+        assert saturation(ScanRows(projections, flats, None)) == []

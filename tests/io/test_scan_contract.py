@@ -66,6 +66,28 @@ def test_values_tell_their_kind_or_leave_a_doubt(
     assert possible_kinds(sampled(values.astype("f4"), np.dtype("u2"))) == ("counts",)
 
 
+@pytest.mark.parametrize("beam", [3.6e4, 2e4])
+def test_numbers_below_zero_that_wrapped_are_told_from_hits(tmp_path: Path, beam: float) -> None:
+    """Darks that were subtracted without a sign, behind something dense."""
+    noise = 4 * np.sin(7.0 * np.arange(VIEWS * ROWS * BINS)).reshape(VIEWS, ROWS, BINS)
+    counts = np.rint(beam * np.exp(-lines(12)) + noise)
+    flats = np.full((3, ROWS, BINS), beam, "u2")
+
+    def told(values: np.ndarray) -> str:
+        path = hdf5(tmp_path / "scan.h5", data=values, white=flats, theta=DEGREES)
+        return " ".join(open_scan(path, dataset="data", flats="white", theta="theta").notes)
+
+    wrapped = counts.astype("i4").astype("u2")
+    assert (wrapped > 65000).any()
+    assert "underflow" in told(wrapped) and "zingers" not in told(wrapped)
+    whole = np.maximum(counts, 0).astype("u2")
+    assert "Doubt" not in told(whole)
+    hit, stuck = whole.copy(), whole.copy()
+    hit[:, :, ::7] = 65535
+    stuck[:, 1, 15] = 65530 + np.arange(VIEWS) % 5
+    assert "underflow" not in told(hit if beam > 3e4 else stuck)
+
+
 def random_views(random: np.random.Generator, shift: float, radius: float) -> np.ndarray:
     """Line integrals of up to four discs in nine views, the first of them apart by ``shift``."""
     t = np.linspace(-1, 1, 200)
@@ -385,6 +407,42 @@ def test_tilts_beside_the_file(tmp_path: Path) -> None:
     (tmp_path / "in" / "a.tlt").symlink_to(tmp_path / "a.rawtlt")
     with pytest.raises(PathEscapeError):
         open_scan(inner, kind="attenuation")
+
+
+def test_tilts_of_serialem_metadata(tmp_path: Path) -> None:
+    """Sections may be listed in the order in which they were taken, from the middle outwards."""
+    path = mrc(tmp_path / "a.mrc", made.frames(11))
+    with pytest.raises(FileFormatError, match=r"a\.rawtlt or a\.mrc\.mdoc"):
+        open_scan(path, kind="attenuation")
+    order = sorted(range(11), key=lambda place: abs(place - 5))
+    parts = [f"[ZValue = {n}]\nTiltAngle = {TILTS[n]:.2f}\nDefocus = -4\n" for n in order]
+    beside = tmp_path / "a.mrc.mdoc"
+    beside.write_text("\n".join(["PixelSpacing = 5.2\n[T = SerialEM: tilt axis]\n", *parts]))
+    scan = open_scan(path, kind="attenuation")
+    np.testing.assert_allclose(np.rad2deg(scan.angles), TILTS, atol=1e-6)
+    assert "a.mrc.mdoc" in scan.notes[1]
+    beside.write_text("\n".join([*parts[:-1], "[ZValue = 10]\n"]))
+    with pytest.raises(FileFormatError, match="tilt angles of 10 of them"):
+        open_scan(path, kind="attenuation")
+    beside.write_text("[ZValue = 0]\nTiltAngle = left\n")
+    with pytest.raises(FileFormatError, match="section 0 is 'left'"):
+        open_scan(path, kind="attenuation")
+
+
+def test_transforms_beside_a_tilt_series_are_told(tmp_path: Path) -> None:
+    path = mrc(tmp_path / "a.mrc", made.frames(11), TILTS)
+    moved = np.tile([1.0, 0, 0, 1, 3, 0], (11, 1))
+
+    def told() -> str:
+        np.savetxt(tmp_path / "a.xf", moved, fmt="%12.7f")
+        return " ".join(open_scan(path, kind="attenuation").notes)
+
+    assert "a.xf" not in told()
+    moved[::2, 4] += 2
+    moved[1::2, 5] -= 1
+    assert "a.xf holds shifts of 1.1 pixels" in told()
+    moved[:, 1] = 0.01
+    assert "a.xf holds transforms" in told()
 
 
 @pytest.mark.parametrize(

@@ -67,6 +67,15 @@ def test_a_name_that_is_taken_or_no_extension_is_refused(raw):
         rift.register_scan_reader(".other", None)
 
 
+def test_arrays_have_a_name_and_are_reconstructed_from_a_file(tmp_path):
+    scan = rift.scan_of_arrays("mine", VALUES, ANGLES, pitch=0.5, unit="mm")
+    np.testing.assert_array_equal(scan.read(1, 3).projections, VALUES[:, 1:3])
+    for given in (scan, VALUES):
+        with pytest.raises(InputError, match=rf"{type(given).__name__}.*numpy\.savez"):
+            rift.reconstruct_scan(given, tmp_path / "out")
+    assert not (tmp_path / "out").exists()
+
+
 def test_arrays_that_make_no_scan_are_refused(tmp_path):
     path = tmp_path / "scan.raw"
     with pytest.raises(ShapeError, match="projections"):

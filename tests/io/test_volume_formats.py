@@ -201,7 +201,9 @@ def test_values_without_a_unit_are_noted_as_such(tmp_path: Path) -> None:
 def test_mrc_of_no_length(tmp_path: Path) -> None:
     write(tmp_path / "v.mrc", "mrc", unit="bin")
     with mrcfile.open(tmp_path / "v.mrc") as file:
-        assert [float(file.header.cella[axis]) for axis in "xyz"] == [0, 0, 0]
+        sizes = [float(file.voxel_size[axis]) for axis in "zyx"]
+        assert sizes == pytest.approx([4, 2, 1])
+        assert file.get_labels()[-1] == "Voxel size unknown: 1 stands for it"
     with pytest.raises(InputError, match=r"8-bit.*uint16"):
         write(tmp_path / "w.mrc", "mrc", dtype="uint8", window=(0, 1))
 

@@ -168,11 +168,27 @@ def test_pixels_that_read_the_same_in_all_views_are_filled(stuck, value):
     broken = truth.copy()
     broken[:, 1, stuck] = value
     found = without_stuck(_found(broken), angles)
-    assert found.dead_bins == tuple(stuck) and found.dead_of_rows.tolist() == [0, len(stuck)]
+    assert found.dead_bins == found.stuck_bins == tuple(stuck)
+    assert found.dead_of_rows.tolist() == [0, len(stuck)]
     np.testing.assert_array_equal(found.projections[:, 0], truth[:, 0])
     assert np.abs(found.projections - truth).max() < 0.25 * truth.max()
     others = np.delete(np.arange(64), stuck)
     np.testing.assert_array_equal(found.projections[..., others], truth[..., others])
+
+
+def test_air_without_noise_is_no_stuck_pixel():
+    """Between two fringes far from the object, and where float32 rounds about 1."""
+    truth, angles = _turning()
+    fringes = truth.copy()
+    fringes[..., [2, 5]] = 1e-5 * np.sin(angles)[:, None, None]
+    fringes[..., 3:5] = 0
+    rounded = np.zeros_like(truth)
+    rounded[..., [10, 50]] = np.where(np.arange(len(angles)) % 3, 0, 1.2e-7)[:, None, None]
+    rounded[..., 20:45] = np.where(np.arange(25) % 2, 1.2e-7 * np.sin(angles)[:, None, None], 0)
+    for lines in (fringes, rounded):
+        found = without_stuck(_found(lines), angles)
+        np.testing.assert_array_equal(found.projections, lines)
+        assert found.dead_bins == () and found.dead == 0
 
 
 def test_bins_that_may_read_the_same_are_left_as_they_are():

@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 from rift_cl.cl.device import Device
 from rift_cl.commands.fit_xray.settings import FitXraySettings
 from rift_cl.commands.inputs.axis_alignment import Alignment
+from rift_cl.commands.inputs.detector_rows import dead_rows_words
 from rift_cl.commands.inputs.row_doubts import row_doubts
 from rift_cl.commands.inputs.scan_axis import find_axis, tilt_worth_turning
 from rift_cl.commands.inputs.scan_input import ScanInput
@@ -204,6 +205,8 @@ class XrayInput:
         integrals, scale = found.projections, self._strongest(found.projections)
         row = found.of_row(middle - self.rows[0])
         self.notes = self._find_axis(row.projections[:, 0])
+        if found.dead_rows:
+            self.notes.append(dead_rows_words(found.dead_rows))
         self._check_memory()
         alignment = self._alignment()
         if alignment is not None:

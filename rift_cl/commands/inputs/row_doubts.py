@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rift_cl.commands.inputs.beam_level import beam_level
+from rift_cl.commands.inputs.detector_rows import read_rows
 from rift_cl.io.scans.scan_file import ScanFile, ScanRows
 from rift_cl.reconstruct.preprocess.flatfield import Attenuation
 
@@ -28,13 +29,12 @@ _UNLIKE = 1.5
 # By how much of it flats of two levels differ at least, and how many times the differences within a
 # level.
 _TWO_LEVELS, _APART = 0.02, 4.0
-# Share of a detector's flat pixels at the largest code that tells of saturation.
-_FULL_SHARE = 0.02
+# Share of a detector's flat pixels, or of samples, at the largest value that tells of saturation,
+# and the least code of so many bits that detectors count to.
+_FULL_SHARE, _LEAST_CODE = 0.02, 2**8 - 1
 # Views over which both ends are averaged before they are compared, and by how much the difference
 # of ends that are taken for air may change over the views, as a share of the largest line integral.
 _BLUR, _CHANGE = 5, 0.05
-# Codes up to which detectors count.
-_FULL = tuple(float(2**bits - 1) for bits in (8, 10, 12, 14, 16))
 
 
 def row_doubts(scan: ScanFile, row: int, found: Attenuation) -> list[str]:
@@ -49,8 +49,11 @@ def row_doubts(scan: ScanFile, row: int, found: Attenuation) -> list[str]:
     # Line integrals of others may be in any unit, and have no frames.
     if scan.kind == "attenuation":
         return _weak_beam(scan, lines)
-    frames = scan.read(row, row + 1)
-    told = _frames(frames) or _no_air(scan, lines, frames.flats is not None)
+    rows = read_rows(scan, row, row + 1)
+    if rows.lost.all():
+        return []
+    frames = rows.frames
+    told = saturation(frames) or _frames(frames) or _no_air(scan, lines, frames.flats is not None)
     # Counts over the mean of each view say nothing of the level of the beam.
     if frames.flats is not None or scan.kind == "transmission" or scan.background:
         told = told or _bright(lines, row) or _weak_beam(scan, lines)
@@ -117,19 +120,61 @@ def _starved(found: Attenuation, row: int, silent: NDArray[np.bool_]) -> list[st
     ]
 
 
+def saturation(rows: ScanRows) -> list[str]:
+    """Pixels whose flats, and samples of views, that read the one largest value that there is.
+
+    Counts of a beam scatter, so that few are the largest and more are one less. Where it is the
+    other way round, the detector, or what cut its codes to fewer bits, goes no further: surely so
+    where that is the largest code of some bits, and else where flats scatter from frame to frame.
+    """
+    most = float(rows.projections.max())
+    told = []
+    if rows.flats is not None:
+        most = max(most, float(rows.flats.max()))
+        told.append((rows.flats, "of the detector's pixels read {:.0f} in all flats"))
+    told.append((rows.projections, "of the samples of a row read {:.0f}"))
+    for frames, where in told:
+        full = frames == most
+        share = float((full if frames is rows.projections else full.all(axis=0)).mean())
+        if share > _FULL_SHARE and (
+            is_full_code(most) or (_scatters(rows) and _piled(frames, most))
+        ):
+            return [
+                f"Doubt: {100 * share:.0f} % {where.format(most)}, the largest value of all: they "
+                "are saturated, so that line integrals come out too small."
+            ]
+    return []
+
+
+def _scatters(rows: ScanRows) -> bool:
+    """Whether most pixels of flats that are not always at one value differ from frame to frame."""
+    if rows.flats is None:
+        return False
+    spread = np.ptp(rows.flats, axis=0)
+    below = spread[rows.flats.min(axis=0) < rows.flats.max()]
+    return below.size > 0 and float(np.median(below)) > 0
+
+
+def _piled(frames: Floats, most: float) -> bool:
+    """Whether more samples read the largest value than the one before it."""
+    below = frames[frames < most]
+    return below.size > 0 and np.sum(frames == most) > np.sum(below == below.max())
+
+
+def is_full_code(value: float) -> bool:
+    """Whether a value is the largest code of some bits, which may be stored in the upper ones."""
+    if value != int(value) or value < _LEAST_CODE:
+        return False
+    code = int(value)
+    step = code & -code
+    return (code + step).bit_count() == 1 and code // step >= _LEAST_CODE
+
+
 def _frames(rows: ScanRows) -> list[str]:
-    """What flats have against each other, and against the detector's range."""
+    """What flats have against each other."""
     flats = rows.flats
     if flats is None or len(flats) < 2:
         return []
-    most = float(flats.max())
-    full = (flats == most).all(axis=0)
-    if most in _FULL and full.mean() > _FULL_SHARE:
-        return [
-            f"Doubt: {100 * full.mean():.0f} % of the detector's pixels read {most:.0f} in all "
-            "flats, the largest code that they can: they are saturated, so that line integrals "
-            "come out too small."
-        ]
     dark = 0.0 if rows.darks is None else float(np.median(rows.darks))
     levels = np.median(flats, axis=(1, 2)) - dark
     if levels.min() > 0 and levels.max() <= _UNLIKE * levels.min():

@@ -8,16 +8,19 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from rift_cl.commands.inputs.detector_rows import DetectorRows, live_ends, read_rows, runs
 from rift_cl.errors import InputError, NonFiniteError
 from rift_cl.io.scans.hdf5_frames import Hdf5Rows
 from rift_cl.io.scans.npy_scan import NpyRows
-from rift_cl.io.scans.scan_file import ScanFile, ScanRows
+from rift_cl.io.scans.scan_file import ScanFile
 from rift_cl.io.scans.tiff_frames import TiffRows
 from rift_cl.io.scans.zarr_scan import ZarrRows
 from rift_cl.reconstruct.preprocess.flatfield import (
     Attenuation,
     attenuation,
     attenuation_without_flats,
+    joined,
+    without_masked,
     without_stuck,
 )
 
@@ -70,36 +73,76 @@ def _hash(content: bytes) -> str:
 def read_attenuation(scan: ScanFile, start: int, stop: int) -> Attenuation:
     """Line integrals of some detector rows, less what the scan's background bins see.
 
+    Pixels that are dead or masked are filled from the bins beside them, and up to three dead rows
+    side by side from the rows beside them.
+
     Raises:
         NonFiniteError: a sample is not finite; the sentence names the file, view, row and bin.
         InputError: the rows cannot be read or corrected.
     """
-    rows = scan.read(start, stop)
-    for name in ("projections", "flats", "darks"):
-        frames = getattr(rows, name)
-        if frames is not None:
-            _check(frames, f"{scan.path}: {name}", start)
-    try:
-        integrals = _integrals(scan, rows, start)
-    except InputError as error:
-        raise type(error)(f"{scan.path}: {error}") from error
-    integrals = without_stuck(integrals, scan.angles)
+    rows = read_rows(scan, start, stop)
+    integrals = without_stuck(_between_live(scan, rows, start), scan.angles)
     if scan.background:
         subtract_background(integrals.projections, scan.background)
     return integrals
 
 
-def _integrals(scan: ScanFile, rows: ScanRows, start: int) -> Attenuation:
-    if scan.kind == "attenuation":
-        none = np.zeros(rows.projections.shape[1], np.int64)
-        return Attenuation(rows.projections, none, none)
-    if rows.flats is None:
-        return attenuation_without_flats(
-            rows.projections, rows.darks, incident=scan.incident, first_row=start
+def _between_live(scan: ScanFile, rows: DetectorRows, start: int) -> Attenuation:
+    """Line integrals of rows; those of dead ones are between the nearest that are not."""
+    if not rows.lost.any():
+        return _integrals(scan, rows, start)
+    pieces = []
+    for first, stop in runs(rows.lost):
+        ends = live_ends(scan, start + first, start + stop) if rows.lost[first] else None
+        if ends is None and rows.masked[first].all():
+            raise NonFiniteError(
+                f"{scan.path}: row {start + first} holds no number in any view, nor do enough of "
+                "the rows beside it: choose other rows (--rows on a command line)"
+            )
+        if ends is None:
+            pieces.append(_integrals(scan, rows.part(first, stop), start + first))
+        else:
+            pieces.append(_between(scan, ends, start + first, start + stop))
+    return joined(pieces)
+
+
+def _between(scan: ScanFile, ends: tuple[int, int], first: int, stop: int) -> Attenuation:
+    """Rows ``first`` to ``stop`` that were filled linearly between two others."""
+    lines = [
+        without_stuck(_integrals(scan, read_rows(scan, row, row + 1), row), scan.angles).projections
+        for row in ends
+    ]
+    dead = np.arange(first, stop)
+    share = ((dead - ends[0]) / (ends[1] - ends[0])).astype(np.float32)[:, None]
+    filled = (1 - share) * lines[0] + share * lines[1]
+    bins = np.full(len(dead), scan.shape[2])
+    return Attenuation(filled, bins, np.zeros_like(bins), dead_rows=tuple(map(int, dead)))
+
+
+def _integrals(scan: ScanFile, rows: DetectorRows, start: int) -> Attenuation:
+    """Line integrals of rows that follow each other.
+
+    Raises:
+        InputError: they cannot be corrected; the sentence names the file.
+    """
+    frames = rows.frames
+    try:
+        if scan.kind == "attenuation":
+            return without_masked(frames.projections, rows.masked, first_row=start)
+        if frames.flats is None:
+            return attenuation_without_flats(
+                frames.projections,
+                frames.darks,
+                incident=scan.incident,
+                masked=rows.masked,
+                first_row=start,
+            )
+        # Masked pixels are 0 in flats and darks alike, which is dead.
+        return attenuation(
+            frames.projections, frames.flats, frames.darks, flats_at=scan.flats_at, first_row=start
         )
-    return attenuation(
-        rows.projections, rows.flats, rows.darks, flats_at=scan.flats_at, first_row=start
-    )
+    except InputError as error:
+        raise type(error)(f"{scan.path}: {error}") from error
 
 
 def subtract_background(projections: NDArray[np.float32], bins: int) -> None:
@@ -112,17 +155,6 @@ def subtract_background(projections: NDArray[np.float32], bins: int) -> None:
     ends = np.concatenate([projections[..., :bins], projections[..., -bins:]], axis=-1)
     offset = ends.mean(axis=-1, keepdims=True, dtype=np.float64)
     projections -= offset.astype(np.float32)
-
-
-def _check(frames: NDArray[np.float32], name: str, start: int) -> None:
-    finite = np.isfinite(frames)
-    if not finite.all():
-        view, row, bin = (int(i) for i in np.argwhere(~finite)[0])
-        raise NonFiniteError(
-            f"{name} hold {np.count_nonzero(~finite)} values that are not finite in these rows, "
-            f"the first at view {view}, row {start + row}, bin {bin}: repair the file, or choose "
-            "other rows"
-        )
 
 
 def chosen_rows(wanted: tuple[int, int] | None, scan: ScanFile) -> tuple[int, int]:

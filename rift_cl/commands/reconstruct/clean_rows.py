@@ -123,7 +123,8 @@ class CleanRows:
             rows = self.alignment.aligned(rows, first, wanted, self._device)
         found = loaded.integrals
         dead, starved = found.dead_of_rows[counted], found.starved_of_rows[counted]
-        return Attenuation(rows, dead, starved, found.dead_bins)
+        lost = tuple(row for row in found.dead_rows if loaded.start <= row < loaded.stop)
+        return Attenuation(rows, dead, starved, found.dead_bins, found.stuck_bins, lost)
 
     @property
     def _halo(self) -> int:

@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 from rift_cl import __version__
 from rift_cl.cl.budget import format_bytes
 from rift_cl.cl.device import Device
+from rift_cl.commands.inputs.detector_rows import dead_rows_words
 from rift_cl.commands.pictures.coverage_pictures import add_missed_planes
 from rift_cl.commands.pictures.slice_pictures import display_window
 from rift_cl.commands.reconstruct.assembly import Assembly, TakeSlab
@@ -291,7 +292,7 @@ class ConeReconstruction:
                     self._finish((yield from self._kept_volume(workers)))
                     return
                 integrals = self._read()
-                self._count(dead_pixels=integrals.dead, starved_samples=integrals.starved)
+                self._mended(integrals)
                 yield Report(1, total, "steps")
                 slabs = yield from self._solve(integrals.projections, total)
                 self._finish(self._whole_volume(slabs))
@@ -370,7 +371,7 @@ class ConeReconstruction:
         """
         for run in runs:
             integrals = self._slabs.read(run)
-            self._count(dead_pixels=integrals.dead, starved_samples=integrals.starved)
+            self._mended(integrals)
             for start, part in self._slabs.made(run, integrals.projections):
                 keep(start, part)
                 yield self.report(self.kept.done)
@@ -386,6 +387,12 @@ class ConeReconstruction:
         self._count(**figures)
         self.source.clean.zingers += zingers
         self.inversion.residuals.update(residuals)
+
+    def _mended(self, integrals: Attenuation) -> None:
+        """Count what was filled in rows that were read, and name those that are dead."""
+        self._count(dead_pixels=integrals.dead, starved_samples=integrals.starved)
+        if integrals.dead_rows:
+            self._say(dead_rows_words(integrals.dead_rows))
 
     def _count(self, **found: int) -> None:
         """Add to the figures of the run."""

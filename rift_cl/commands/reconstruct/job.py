@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 from rift_cl import __version__
 from rift_cl.cl.device import Device
+from rift_cl.commands.inputs.detector_rows import dead_rows_words
 from rift_cl.commands.reconstruct.assembly import Assembly, TakeSlab
 from rift_cl.commands.reconstruct.clean_rows import LoadedRows
 from rift_cl.commands.reconstruct.decided import decided_settings
@@ -355,7 +356,7 @@ class Reconstruction:
     def _slab(
         self, slab: slice, integrals: Attenuation, before: int
     ) -> Generator[Report, None, Floats]:
-        self._count(dead_pixels=integrals.dead, starved_samples=integrals.starved)
+        self._mended(integrals)
         steps = self.inversion.slices(self.rows[0] + slab.start, integrals.projections)
         done = before * self.settings.most_steps
         while True:
@@ -373,6 +374,12 @@ class Reconstruction:
         self._count(**figures)
         self.source.clean.zingers += zingers
         self.inversion.residuals.update(residuals)
+
+    def _mended(self, integrals: Attenuation) -> None:
+        """Count what was filled in rows that were read, and name those that are dead."""
+        self._count(dead_pixels=integrals.dead, starved_samples=integrals.starved)
+        if integrals.dead_rows:
+            self._say(dead_rows_words(integrals.dead_rows))
 
     def _count(self, **found: int) -> None:
         """Add to the figures of the run."""

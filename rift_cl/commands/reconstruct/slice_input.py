@@ -218,8 +218,8 @@ class SliceInput:
             self.pad = max(1, self.scan.shape[2] // _PAD_SHARE)
             self.geometry = self.geometry if self.fan is None else self._geometry()
         self.notes += _notes_of(self) + doubts + self._noise_note(row[:, 0])
-        if read.dead_bins and self.settings.binning == 1:
-            self.notes.append(_dead_note(read.dead_bins, middle))
+        if self.settings.binning == 1:
+            self.notes += _filled_notes(read, middle)
 
     def _doubts(self, row: Floats) -> list[str]:
         """What the data have against the angles, and against an axis that was given."""
@@ -552,13 +552,25 @@ def _wide_note(source: SliceInput) -> str:
     )
 
 
-def _dead_note(bins: tuple[int, ...], row: int) -> str:
-    listed = ", ".join(map(str, bins[:_MOST_LISTED])) + (", ..." if bins[_MOST_LISTED:] else "")
-    words = f"bin {listed} does" if len(bins) == 1 else f"bins {listed} do"
-    return (
-        f"In row {row} {words} not answer to the beam (dead or stuck pixels) and "
+def _filled_notes(read: Attenuation, row: int) -> list[str]:
+    """Which pixels of a row were filled from their neighbours, and why."""
+    stuck = read.stuck_bins
+    dead = tuple(bin for bin in read.dead_bins if bin not in stuck)
+    told = [
+        (dead, "does not answer to the beam", "do not answer to the beam", "dead or masked"),
+        (stuck, "reads the same in all views", "read the same in all views", "stuck or saturated"),
+    ]
+    return [
+        f"In row {row} {_listed(bins)} {one if len(bins) == 1 else many} ({why} pixels) and "
         f"{'was' if len(bins) == 1 else 'were'} filled from the neighbours."
-    )
+        for bins, one, many, why in told
+        if bins
+    ]
+
+
+def _listed(bins: tuple[int, ...]) -> str:
+    listed = ", ".join(map(str, bins[:_MOST_LISTED])) + (", ..." if bins[_MOST_LISTED:] else "")
+    return f"bin {listed}" if len(bins) == 1 else f"bins {listed}"
 
 
 def _gap_note(angles: NDArray[np.float64]) -> list[str]:

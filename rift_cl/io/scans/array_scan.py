@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -44,7 +45,7 @@ class ArrayRows:
 
 
 def scan_of_arrays(
-    path: Path,
+    path: str | os.PathLike[str],
     projections: ArrayLike,
     angles: ArrayLike,
     *,
@@ -59,7 +60,7 @@ def scan_of_arrays(
     """Describe a scan whose arrays were read, or mapped, by somebody else.
 
     Args:
-        path: the file that they come from.
+        path: the file that they come from, or any name, for sentences about them.
         projections: (angle, row, bin) real numbers; a memory map is read a few rows at a time.
         angles: (angle,) radians.
         flats: frames with the beam but without the sample, (n, row, bin).
@@ -76,6 +77,7 @@ def scan_of_arrays(
         NonFiniteError: an angle is NaN or infinite.
         InputError: the angles look like degrees.
     """
+    path = Path(path)
     stack = _frames(path, "projections", projections, None)
     others = [
         None if given is None else _frames(path, name, given, stack.shape[1:])

@@ -265,7 +265,8 @@ def _passed_over(found: Finding, kind: str) -> tuple[str, ...]:
 def _doubts(found: Finding, kind: Kind, seen: Sample, *, calibrated: bool) -> tuple[str, ...]:
     """What values, and arrays beside them, have against what the scan was taken to be."""
     if kind == "counts":
-        return _unused(found) if found.unused and not calibrated else ()
+        unused = _unused(found) if found.unused and not calibrated else ()
+        return _underflow(found, seen) + unused
     if found.kind is not None:
         return ()
     return _impossible(seen) if kind == "attenuation" else ()
@@ -355,7 +356,7 @@ def _no_counts_of(found: Finding, seen: Sample, bright: float, dark: float) -> s
             f"{found.name} ({seen}) is far below the flats' {bright:.4g}, as data are that were "
             "divided by flats before"
         )
-    if seen.bright - dark > _BRIGHTER * beam:
+    if seen.bright - dark > _BRIGHTER * beam and not seen.wrapped:
         return (
             f"{found.name} ({seen}) is more than {_BRIGHTER:g} times as bright as the flats, "
             f"{bright:.4g}, in too many places for zingers and stuck pixels"
@@ -366,11 +367,23 @@ def _no_counts_of(found: Finding, seen: Sample, bright: float, dark: float) -> s
 def _few_bright(found: Finding, seen: Sample, bright: float, dark: float) -> tuple[str, ...]:
     """A doubt about single values that no beam explains; arguments as for ``_no_counts_of``."""
     # Flats no brighter than the darks are told by whoever divides by them.
-    if bright <= dark or seen.high - dark <= _BRIGHTER * (bright - dark):
+    if seen.wrapped or bright <= dark or seen.high - dark <= _BRIGHTER * (bright - dark):
         return ()
     return (
         f"Doubt: a few values of {found.name} ({seen}) are more than {_BRIGHTER:g} times as bright "
         f"as the flats, {bright:.4g}: zingers, which --zingers 6 takes out, or stuck pixels.",
+    )
+
+
+def _underflow(found: Finding, seen: Sample) -> tuple[str, ...]:
+    """A doubt about numbers below zero that were stored without a sign."""
+    if not seen.wrapped:
+        return ()
+    return (
+        f"Doubt: {found.name} ({seen}) holds values near the largest that {seen.dtype.name} takes "
+        "between others near zero, as numbers below zero become without a sign (underflow): "
+        "subtract darks in signed numbers or in floating point, or give the counts as they were "
+        "and --darks.",
     )
 
 

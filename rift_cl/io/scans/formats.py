@@ -137,7 +137,8 @@ def open_scan(
     for each projection, in the order of their numbers, one file with a page for each, or sinograms;
     flats and darks are recognised by the names of files and folders, angles by ``angles.txt`` or
     ``theta.txt``, and are else taken as even over 180 degrees. MRC (.mrc, .st, .ali, .rec) is a
-    tilt series about the y axis, its angles in the extended header or in a .tlt or .rawtlt file.
+    tilt series about the y axis, its angles in the extended header or in a .tlt, .rawtlt
+    or .mdoc file.
 
     Fans and cones are told by what the scanner wrote: Nikon's .xtekct and SkyScan's .log, opened
     themselves or lying in the folder of their images, as our own .yaml or .json; Zeiss' .txrm;

@@ -38,6 +38,10 @@ _NOISE = 0.5
 _COMPUTED = 0.4
 # Ends of counts in air are at least this share of the brightest, of transmission nearly that.
 _BRIGHT, _NEARLY = 0.6, 0.85
+# Numbers below zero that an unsigned type of so many bytes at most wrapped lie in this share of its
+# range at the top, as far below it as the noise of dark samples, which is at most this share of the
+# bright ones; beside them it is dark as well. A few of them, in more bins than one, tell.
+_WRAPPED_BYTES, _TOP, _DARK, _WRAPPED_FEW = 2, 0.125, 0.05, 4
 # Transmission reads about the same at both ends, unless an object reaches one: a person knows.
 _BOTH = 0.7
 
@@ -65,6 +69,8 @@ class Sample:
         middle: median of the middle half of the bins.
         whole: every value is a whole number.
         zeros: share of the outermost values that are exactly 0, as in sums that were computed.
+        wrapped: values at the top of an unsigned type's range that stand for numbers below zero,
+            as where darks were subtracted without a sign; 0 where some may as well be hits.
     """
 
     dtype: np.dtype[np.generic]
@@ -76,6 +82,7 @@ class Sample:
     middle: float
     whole: bool
     zeros: float
+    wrapped: int = 0
 
     def __str__(self) -> str:
         return f"{self.dtype.name}, {self.low:.4g} to {self.high:.4g} in the frames looked at"
@@ -121,7 +128,30 @@ def sampled(values: NDArray[np.float32], dtype: np.dtype[np.generic]) -> Sample:
         middle=_median(lines[..., bins // 4 : max(bins - bins // 4, bins // 4 + 1)]),
         whole=bool((finite == np.rint(finite)).all()),
         zeros=float(np.mean(outer == 0)),
+        wrapped=_wrapped(lines, dtype),
     )
+
+
+def _wrapped(lines: NDArray[np.float64], dtype: np.dtype[np.generic]) -> int:
+    """Values that are below zero but for their type, between others about zero.
+
+    Hits and stuck pixels are as bright, but few of them lie so near to the end of the range without
+    being the last code itself, between samples that are dark or wrapped, one of them dark.
+    """
+    if dtype.kind != "u" or dtype.itemsize > _WRAPPED_BYTES:
+        return 0
+    codes = 2.0 ** (8 * dtype.itemsize)
+    top = lines >= (1 - _TOP) * codes
+    if not top.any() or top.all():
+        return 0
+    noise = _DARK * float(np.percentile(lines[~top], 95))
+    below = top & (codes - lines <= noise)
+    dark = ~top & (np.abs(lines) <= noise)
+    low, inner = below | dark, lines[..., 1:-1]
+    wrapped = below[..., 1:-1] & low[..., :-2] & low[..., 2:] & (dark[..., :-2] | dark[..., 2:])
+    count, bins = int(wrapped.sum()), wrapped.any(axis=tuple(range(lines.ndim - 1)))
+    several = count >= _WRAPPED_FEW and bins.sum() > 1 and np.ptp(inner[wrapped]) > 0
+    return count if several else 0
 
 
 def _median(values: NDArray[np.float64]) -> float:

@@ -1,10 +1,10 @@
 """Finds a tilt series in an MRC file, the format of electron tomography, by the library mrcfile.
 
 Sections are views, and the tilt axis is along y (the convention of IMOD and of aligned stacks), so
-that lines are detector rows and columns are bins. Tilt angles stand in a text beside the file, as
-refined (.tlt) or as recorded (.rawtlt), or in the extended header that FEI's or SerialEM's software
-writes. What the intensities mean nobody writes down: in bright field they are counts whose beam is
-not seen, in dark field they grow with mass thickness; so a person says it.
+that lines are detector rows and columns are bins. Tilt angles stand in a text beside the file
+(``imod_files``), or in the extended header that FEI's or SerialEM's software writes. What the
+intensities mean nobody writes down: in bright field they are counts whose beam is not seen, in dark
+field they grow with mass thickness; so a person says it.
 
 Source of the layout: Cheng et al., MRC2014, J. Struct. Biol. 192, 146 (2015); of SerialEM's
 extended header: the description of IMOD's format (bits of nreal; the tilt is a short of hundredths
@@ -26,12 +26,11 @@ from numpy.typing import NDArray
 
 from rift_cl.errors import DTypeError, FileFormatError, InputError
 from rift_cl.io.boundary import check_claim, reading
-from rift_cl.io.captures.capture_paths import CaptureFolder
-from rift_cl.io.number_list import text_numbers
 from rift_cl.io.scans.angle_list import AngleList, even_turn, file_and_column, file_angles
 from rift_cl.io.scans.axes import axes_of
 from rift_cl.io.scans.contract import AIR, MEAN, Finding, scan_of
 from rift_cl.io.scans.frame_stack import FrameStack
+from rift_cl.io.scans.imod_files import names_of_tilts, tilts_beside, unused_transforms
 from rift_cl.io.scans.scan_file import (
     Frames,
     Part,
@@ -45,7 +44,6 @@ SUFFIXES = (".mrc", ".st", ".ali", ".rec")
 _HEADER = 1024
 # Bytes of a sample by mode; two modes are complex, and one packs two samples into a byte.
 _MODES = {0: 1, 1: 2, 2: 4, 6: 2, 12: 2}
-_SIDECARS = (".tlt", ".rawtlt")
 _LITTLE = (b"DD", b"DA")
 # Where an extended header of SerialEM states the bytes of a section and what they hold.
 _SERIAL = slice(16, 20)
@@ -136,7 +134,7 @@ def open_mrc_scan(path: Path, request: ScanRequest, *, budget: int | None) -> Sc
         pitch=pixel.bin,
         row_pitch=pixel.row,
         unit=pixel.unit,
-        notes=(note, *doubts),
+        notes=(note, *doubts, *unused_transforms(path)),
         advice=_ADVICE,
     )
     return scan_of(found, request)
@@ -194,19 +192,14 @@ def _angles(path: Path, file: Any, theta: str | None) -> tuple[AngleList, str]:
         file, column = file_and_column(theta)
         angles = even_turn(theta) or file_angles(Path(file).absolute(), column)
         return angles, f"The tilt angles are {theta}, about the y axis."
-    folder = CaptureFolder(path.parent)
-    for suffix in _SIDECARS:
-        if path.with_suffix(suffix).exists():
-            sidecar = folder.file(str(path), path.with_suffix(suffix).name)
-            with reading(sidecar, "the list of angles"):
-                values = text_numbers(sidecar, "angles")
-            told = f"The tilt angles are those of {sidecar.name}, about the y axis."
-            return AngleList(str(sidecar), values, unit="degrees"), told
+    beside = tilts_beside(path)
+    if beside is not None:
+        return beside, f"The tilt angles are those of {Path(beside.name).name}, about the y axis."
     recorded = _header_angles(file)
     if recorded is None:
         raise FileFormatError(
-            f"{path}: holds no tilt angles, and no {path.stem}.tlt or {path.stem}.rawtlt is beside "
-            "it: give them with theta= (--theta); a reconstructed volume is no scan"
+            f"{path}: holds no tilt angles, and none of {names_of_tilts(path)} beside it does: "
+            "give them with theta= (--theta); a reconstructed volume is no scan"
         )
     told = "The tilt angles are those of the extended header, about the y axis."
     return AngleList("the extended header", recorded, unit="degrees"), told

@@ -1,9 +1,10 @@
 """A volume as an MRC file, the format of electron tomography (MRC2014).
 
 Float32 (mode 2) or unsigned 16-bit integers (mode 6); the format's bytes are signed, so that
-``open_volume`` refuses 8-bit samples. Lengths are in angstrom and left out where the unit is no
-length. What integers stand for is said in the labels ``add_offset = ...`` and
-``scale_factor = ...``.
+``open_volume`` refuses 8-bit samples. Lengths are in angstrom. Where the unit is no length, voxels
+are 1 along x, as IMOD takes a size that is not known: the standard is silent, and programs that
+divide by the size fail with zero. A label says so. What integers stand for is said in the labels
+``add_offset = ...`` and ``scale_factor = ...``.
 """
 
 from __future__ import annotations
@@ -27,6 +28,7 @@ from rift_cl.io.volumes.sample_window import restored
 from rift_cl.io.volumes.slice_statistics import SliceStatistics
 
 _ANGSTROM = 1e-10
+_UNKNOWN = "Voxel size unknown: 1 stands for it"
 _LABEL = re.compile(r"(add_offset|scale_factor) = (\S+)\s*")
 
 
@@ -61,13 +63,11 @@ def _write_header(layout: VolumeLayout, part: Path) -> int:
         header = file.header.copy()
     header.nz, header.ny, header.nx = header.mz, header.my, header.mx = layout.shape
     lengths = layout.lengths(_ANGSTROM)
-    if lengths is not None:
-        extent = [n * step for n, step in zip(layout.shape, lengths, strict=True)]
-        header.cella.z, header.cella.y, header.cella.x = extent
-        ratio = lengths[2] / layout.spacing[2]
-        header.origin.z, header.origin.y, header.origin.x = (ratio * at for at in layout.origin)
-    else:
-        header.cella = (0, 0, 0)
+    steps = lengths or [step / layout.spacing[2] for step in layout.spacing]
+    extent = [n * step for n, step in zip(layout.shape, steps, strict=True)]
+    header.cella.z, header.cella.y, header.cella.x = extent
+    ratio = steps[2] / layout.spacing[2]
+    header.origin.z, header.origin.y, header.origin.x = (ratio * at for at in layout.origin)
     _write_labels(header, layout)
     part.write_bytes(header.tobytes())
     return int(header.nbytes)
@@ -80,6 +80,8 @@ def _write_labels(header: Any, layout: VolumeLayout) -> None:
         numbers = layout.window.attributes
         labels += [f"{name} = {numbers[name]!r}" for name in ("add_offset", "scale_factor")]
         labels.append(numbers["formula"])
+    if layout.lengths(_ANGSTROM) is None:
+        labels.append(_UNKNOWN)
     header.label[:] = b""
     for index, label in enumerate(labels):
         header.label[index] = label.encode("ascii", "replace")[:80]

@@ -18,6 +18,7 @@ an invented peak. One such column would otherwise be a ring, and one NaN a ruine
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -35,9 +36,11 @@ _FAINTEST = 1e-7
 # deviation of a pixel tells their spread; how many standard deviations an outlier is away, of which
 # a median deviation is one over 1.48.
 _ENOUGH_FRAMES, _MANY_FRAMES, _OUTLIER, _SIGMAS = 3, 5, 8.0, 1.48
-# Views and angle from which on a pixel that reads the same in all of them is told, and by how much
-# it may vary, as a share of what its row spans.
-_ENOUGH_VIEWS, _ENOUGH_TURN, _STUCK = 12, np.radians(150), 1e-6
+# Views and angle from which on a pixel that reads the same in all of them is told; by how much it
+# may vary, and how far from its neighbours it is in some view, as shares of what its row spans.
+_ENOUGH_VIEWS, _ENOUGH_TURN, _STUCK, _APART = 12, np.radians(150), 1e-6, 1e-3
+# What float32 leaves of the logarithm of a transmission near 1.
+_ROUNDED = 1e-6
 # Dark frames from which on their noise can be told.
 _ENOUGH_DARKS = 3
 
@@ -52,18 +55,24 @@ class Attenuation:
         starved_of_rows: samples of each row without a signal above the darks' noise, filled in the
             same way, (row,).
         dead_bins: bins of which a pixel was filled in some of the rows, ascending.
+        stuck_bins: those of them that answer to the beam and read the same in all views.
+        dead_rows: numbers of rows without a pixel that answers, which were filled from the rows on
+            either side, ascending.
     """
 
     projections: Floats
     dead_of_rows: Counts
     starved_of_rows: Counts
     dead_bins: tuple[int, ...] = ()
+    stuck_bins: tuple[int, ...] = ()
+    dead_rows: tuple[int, ...] = ()
 
     def of_row(self, row: int) -> Attenuation:
-        """Those of one row, which keeps its axis; bins are those of all rows."""
+        """Those of one row, which keeps its axis; bins and dead rows are those of all rows."""
         one = slice(row, row + 1)
         counts = self.dead_of_rows[one], self.starved_of_rows[one]
-        return Attenuation(self.projections[:, one], *counts, self.dead_bins)
+        bins = self.dead_bins, self.stuck_bins
+        return Attenuation(self.projections[:, one], *counts, *bins, self.dead_rows)
 
     @property
     def dead(self) -> int:
@@ -74,6 +83,18 @@ class Attenuation:
     def starved(self) -> int:
         """Samples without a signal above the darks' noise, filled in the same way."""
         return int(self.starved_of_rows.sum())
+
+
+def joined(parts: Sequence[Attenuation]) -> Attenuation:
+    """Those of rows that follow each other."""
+    return Attenuation(
+        np.concatenate([part.projections for part in parts], axis=1),
+        np.concatenate([part.dead_of_rows for part in parts]),
+        np.concatenate([part.starved_of_rows for part in parts]),
+        tuple(sorted({bin for part in parts for bin in part.dead_bins})),
+        tuple(sorted({bin for part in parts for bin in part.stuck_bins})),
+        tuple(row for part in parts for row in part.dead_rows),
+    )
 
 
 def attenuation(
@@ -130,6 +151,7 @@ def attenuation_without_flats(
     darks: Floats | None = None,
     *,
     incident: NDArray[np.float64] | None = None,
+    masked: NDArray[np.bool_] | None = None,
     first_row: int = 0,
 ) -> Attenuation:
     """Take -log of transmission, or of counts whose beam is a number for each view.
@@ -139,6 +161,7 @@ def attenuation_without_flats(
         darks: counts without the beam, (n, row, bin); zero if not given.
         incident: (angle,) the beam's counts, less the darks; 1 if not given, which leaves counts
             with line integrals that are off by one number in each view and row.
+        masked: (row, bin) pixels that hold nothing; they count as dead.
         first_row: number of the first row, for errors.
 
     Raises:
@@ -151,7 +174,28 @@ def attenuation_without_flats(
     beam = np.maximum(signal.max(axis=(0, 2)), 0)[:, None]
     scale = 1.0 if incident is None else float(np.mean(incident))
     faintest = np.maximum(_dark_noise(darks) / np.float32(scale), _FAINTEST * beam)
-    return _minus_log(signal, faintest, np.zeros(projections.shape[1:], np.bool_), first_row)
+    dead = np.zeros(projections.shape[1:], np.bool_) if masked is None else masked
+    return _minus_log(signal, faintest, dead, first_row)
+
+
+def without_masked(lines: Floats, masked: NDArray[np.bool_], *, first_row: int = 0) -> Attenuation:
+    """Line integrals as they are given, with pixels that hold nothing filled.
+
+    Args:
+        lines: line integrals (angle, row, bin); changed in place.
+        masked: (row, bin) pixels that hold nothing.
+        first_row: number of the first row, for errors.
+
+    Raises:
+        InputError: a row holds nothing else.
+    """
+    empty = np.zeros(lines.shape[1], np.int64)
+    if not masked.any():
+        return Attenuation(lines, empty, empty)
+    for row in np.flatnonzero(masked.any(axis=1)):
+        unknown = np.broadcast_to(masked[row], lines[:, row].shape)
+        _fill(lines[:, row], unknown, first_row + int(row))
+    return Attenuation(lines, masked.sum(axis=1), empty, _bins(masked))
 
 
 def without_stuck(found: Attenuation, angles: NDArray[np.float64]) -> Attenuation:
@@ -170,9 +214,10 @@ def without_stuck(found: Attenuation, angles: NDArray[np.float64]) -> Attenuatio
         return found
     # Most pixels are seen to vary by a few views alone.
     few = lines[np.linspace(0, len(lines) - 1, _ENOUGH_VIEWS).astype(int)]
-    room = _STUCK * np.ptp(few, axis=(0, 2))[:, None]
+    span = np.ptp(few, axis=(0, 2))
+    room = _STUCK * span[:, None]
     stuck = np.ptp(few, axis=0) <= room
-    dead, bins = found.dead_of_rows.copy(), set(found.dead_bins)
+    dead, bins = found.dead_of_rows.copy(), set(found.stuck_bins)
     for row in np.flatnonzero(stuck.any(axis=1)):
         varying = np.flatnonzero(~stuck[row])
         if not len(varying):
@@ -184,10 +229,17 @@ def without_stuck(found: Attenuation, angles: NDArray[np.float64]) -> Attenuatio
             continue
         unknown = np.zeros(lines.shape[::2], np.bool_)
         unknown[:, between] = True
-        _fill(lines[:, row], unknown, int(row))
-        dead[row] += len(between)
-        bins.update(map(int, between))
-    return replace(found, dead_of_rows=dead, dead_bins=tuple(sorted(bins)))
+        filled = lines[:, row].copy()
+        _fill(filled, unknown, int(row))
+        # Air without noise reads the same as well, and what its neighbours read but for rounding.
+        apart = np.abs(filled[:, between] - lines[:, row, between]).max(axis=0)
+        wrong = between[apart > max(_APART * span[row], _ROUNDED)]
+        lines[:, row, wrong] = filled[:, wrong]
+        dead[row] += len(wrong)
+        bins.update(map(int, wrong))
+    of_both = tuple(sorted(bins.union(found.dead_bins)))
+    told = tuple(sorted(bins))
+    return replace(found, dead_of_rows=dead, dead_bins=of_both, stuck_bins=told)
 
 
 def _mean_dark(projections: Floats, darks: Floats | None) -> Floats:
@@ -248,8 +300,11 @@ def _minus_log(
     if unknown.any():
         for row in np.flatnonzero(unknown.any(axis=(0, 2))):
             _fill(transmission[:, row], unknown[:, row], first_row + int(row))
-    dead_bins = tuple(map(int, np.flatnonzero(dead.any(axis=0))))
-    return Attenuation(transmission, dead_of_rows, starved_of_rows, dead_bins)
+    return Attenuation(transmission, dead_of_rows, starved_of_rows, _bins(dead))
+
+
+def _bins(dead: NDArray[np.bool_]) -> tuple[int, ...]:
+    return tuple(map(int, np.flatnonzero(dead.any(axis=0))))
 
 
 def _fill(lines: Floats, unknown: NDArray[np.bool_], row: int) -> None:
