@@ -74,6 +74,8 @@ def test_a_view_stands_for_its_own_side_where_its_opposite_is_missing():
     best, errors = half_sinogram(CENTER, angles=ANGLES[::8]), []
     for sinogram, scan in (best, half_sinogram(CENTER, angles=angles)):
         image = rift.fbp(rift.Projector(GRID, scan), sinogram)
+        joined, wide = widened(sinogram, scan)
+        np.testing.assert_array_equal(rift.fbp(rift.Projector(GRID, wide), joined), image)
         whole, every = best
         again = rift.Projector(GRID, every)(image)
         errors.append(np.linalg.norm(again - whole) / np.linalg.norm(whole))

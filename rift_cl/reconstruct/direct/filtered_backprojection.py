@@ -51,6 +51,7 @@ from rift_cl.reconstruct.direct.fdk import (
 )
 from rift_cl.reconstruct.direct.katsevich import Katsevich, cone_inversion
 from rift_cl.reconstruct.direct.offset_axis import (
+    OwnSideViews,
     is_offset,
     is_weighed,
     offset_weights,
@@ -320,7 +321,8 @@ def _gains(scan: Parallel, compensate: str | None, diameter: float) -> Floats | 
     A view of a half acquisition shows what is on its own side of the axis. Where the one from the
     opposite side is missing it shows no more, so that it stands for its share of the whole circle.
     """
-    own_side = compensate not in COMPENSATIONS and is_offset(scan)
+    own_side = is_offset(scan) or isinstance(scan, OwnSideViews)
+    own_side = own_side and compensate not in COMPENSATIONS
     # Twice around for halves of angles is once around.
     return view_gains(scan.angles / 2 if own_side else scan.angles, compensate, diameter)
 

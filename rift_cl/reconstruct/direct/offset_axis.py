@@ -21,6 +21,15 @@ from rift_cl.geometry import Fan, Parallel
 Floats = NDArray[np.float64]
 Stack = NDArray[np.float32]
 
+
+class OwnSideViews(Parallel):
+    """Views that were weighed and widened: each shows its own side of the axis and no other.
+
+    Where one is missing, its neighbours on the whole circle stand for it, and the view from the
+    opposite side does not.
+    """
+
+
 # An axis counts as offset where the shorter side is below this share of the longer.
 _OFFSET = 0.8
 # Sides of a detector that differ by no more bins than this reach as far as each other. Where they
@@ -153,7 +162,8 @@ def widened(projections: Stack, scan: Parallel) -> tuple[Stack, Parallel]:
         scan: its geometry.
 
     Returns:
-        Projections as wide as twice the longer side, and their geometry.
+        Projections as wide as twice the longer side, and their geometry, from which filtered
+        backprojection knows what each view stands for.
     """
     wide, before = widened_scan(scan)
     after = wide.bins - scan.bins - before
@@ -163,11 +173,15 @@ def widened(projections: Stack, scan: Parallel) -> tuple[Stack, Parallel]:
 
 
 def widened_scan(scan: Parallel) -> tuple[Parallel, int]:
-    """The scan of a detector as wide as twice the longer side, and how many bins come before."""
+    """The scan of a detector as wide as twice the longer side, and how many bins come before.
+
+    Of an offset axis views are ``OwnSideViews``.
+    """
     missing = _missing(scan)
     before = missing if _right_over_left(scan) > 0 else 0
     bins = scan.bins + missing
-    return Parallel(scan.angles, bins, scan.pitch, scan.center + before), before
+    kind = OwnSideViews if is_offset(scan) else Parallel
+    return kind(scan.angles, bins, scan.pitch, scan.center + before), before
 
 
 def _missing(scan: Parallel | Fan) -> int:
