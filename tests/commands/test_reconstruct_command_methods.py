@@ -145,6 +145,28 @@ def test_views_of_an_offset_axis_stand_for_their_own_side(tmp_path, angles):
     np.testing.assert_allclose(volume[0], image, atol=1e-4 * image.max())
 
 
+@pytest.mark.parametrize(
+    ("method", "missing", "wide", "said"),
+    [
+        ("fbp", 4, True, "no view between 78 and 88 degrees: those beside them"),
+        ("fbp", 20, False, "none between 78 and 120 degrees): objects that reach further"),
+        ("cgls", 20, True, "no view between 78 and 120 degrees: what they alone"),
+    ],
+)
+def test_a_hole_in_the_turn_of_an_offset_axis_is_told(tmp_path, method, missing, wide, said):
+    path, angles = tmp_path / "scan.npz", np.delete(FULL, range(40, 40 + missing))
+    save_phantom(path, angles, 40, 6.4)
+    options = ("--kind", "attenuation", "--center", 6.4, "--method", method)
+    volume, assumed = reconstruct(path, tmp_path / "out", *options)
+    assert volume.shape[1:] == ((67, 67) if wide else (40, 40))
+    assert said in assumed
+    assert ("wider than the detector" in assumed) == (not wide)
+    if method == "fbp":
+        stitched = ("--half-acquisition", "stitched", "--out", tmp_path / "stitched")
+        assert run("reconstruct", path, *options, *stitched) == 3
+        assert not (tmp_path / "stitched/slices").exists()
+
+
 def test_a_full_turn_whose_axis_is_off_by_a_little_has_the_rim(tmp_path):
     path, bins, center, fine = tmp_path / "scan.npz", 48, 21.5, 8
     away = (np.arange(bins * fine) + 0.5) / fine - 0.5 - center
