@@ -210,6 +210,20 @@ def test_an_object_wider_than_the_detector_is_continued(tmp_path):
     assert abs((explained[0] - truth)[border].mean()) < 0.3 * bias[1]
 
 
+def test_the_axis_is_that_of_the_rows_that_are_wanted_beside_air(tmp_path):
+    path, stack = tmp_path / "scan.npz", np.zeros((VIEWS, 40, 72))
+    for first, center in ((1, 35.5), (30, 38.0)):
+        save_phantom(path, HALF, 72, center, rows=8)
+        with np.load(path) as scan:
+            stack[:, first : first + 8] = scan["projections"]
+    np.savez(path, projections=stack, angles=HALF)
+    options = ("--kind", "attenuation", "--rows", 30, 38, "--method", "backproject")
+    _, assumed = reconstruct(path, tmp_path / "out", *options)
+    assert "as most show air" in assumed
+    metrics = json.loads((tmp_path / "out/metrics.json").read_text())
+    assert metrics["center"] == pytest.approx(38.0, abs=0.5)
+
+
 def test_the_background_is_brought_to_zero(tmp_path):
     path = tmp_path / "scan.npz"
     truth = save_phantom(path, HALF, 80, offset=0.7)

@@ -247,7 +247,7 @@ class XrayInput:
             return doubted_parallel(
                 scan, line, center, self.tilt, away=away, spanned=spanned, device=self.device
             )
-        found = find_axis(scan, self.device)
+        found = find_axis(scan, self.device, rows=self.settings.rows)
         self.center = found.center
         if tilt is None:
             self.tilt = tilt_worth_turning(found, detector_rows)

@@ -276,7 +276,8 @@ class SliceInput:
             self.settled_by = settled_axis(self.file, center, self.device, zingers=zingers)
             self.center, self.turned = self.settled_by.center, self.settled_by.turned
             return
-        self.estimate = find_axis(self.file, self.device, zingers=zingers)
+        rows = self.settings.rows
+        self.estimate = find_axis(self.file, self.device, zingers=zingers, rows=rows)
         self.center = self.estimate.center
         if self.settings.tilt is None:
             self.tilt = tilt_worth_turning(self.estimate, self.file.shape[1])
