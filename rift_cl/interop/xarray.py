@@ -154,7 +154,8 @@ def _scan_labels(
         if values.ndim == 3:
             labels["row"] = (np.arange(values.shape[1], dtype=np.float64), {})
     labels["detector"] = _label((np.arange(scan.bins) - column) * wide, wide)
-    attributes: dict[str, Any] = {_KIND: type(scan).__name__}
+    kind = "Parallel" if isinstance(scan, Parallel) else type(scan).__name__
+    attributes: dict[str, Any] = {_KIND: kind}
     if not isinstance(scan, Parallel):
         attributes |= {n: getattr(scan, n) for n in ("source_to_axis", "source_to_detector")}
         attributes["curved"] = int(scan.curved)

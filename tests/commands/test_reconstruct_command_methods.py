@@ -133,6 +133,40 @@ def test_a_full_turn_with_an_offset_axis_needs_no_word(tmp_path, center, options
     assert volume[0][seen].mean() == pytest.approx(truth[seen].mean(), rel=0.02)
 
 
+@pytest.mark.parametrize("angles", [np.delete(FULL, 70), np.linspace(0, 2 * np.pi, 37)])
+def test_views_of_an_offset_axis_stand_for_their_own_side(tmp_path, angles):
+    """Where one is missing or both ends of the turn are there, as ``fbp`` has it."""
+    path = tmp_path / "scan.npz"
+    save_phantom(path, angles, 40, 6.4)
+    volume, _ = reconstruct(path, tmp_path / "out", "--kind", "attenuation", "--center", 6.4)
+    A = rift.Projector(rift.Grid((67, 67)), rift.Parallel(angles, 40, center=6.4))
+    with np.load(path) as scan:
+        image = rift.fbp(A, scan["projections"][:, 0].astype(np.float32))
+    np.testing.assert_allclose(volume[0], image, atol=1e-4 * image.max())
+
+
+@pytest.mark.parametrize(
+    ("method", "missing", "wide", "said"),
+    [
+        ("fbp", 4, True, "no view between 78 and 88 degrees: those beside them"),
+        ("fbp", 20, False, "none between 78 and 120 degrees): objects that reach further"),
+        ("cgls", 20, True, "no view between 78 and 120 degrees: what they alone"),
+    ],
+)
+def test_a_hole_in_the_turn_of_an_offset_axis_is_told(tmp_path, method, missing, wide, said):
+    path, angles = tmp_path / "scan.npz", np.delete(FULL, range(40, 40 + missing))
+    save_phantom(path, angles, 40, 6.4)
+    options = ("--kind", "attenuation", "--center", 6.4, "--method", method)
+    volume, assumed = reconstruct(path, tmp_path / "out", *options)
+    assert volume.shape[1:] == ((67, 67) if wide else (40, 40))
+    assert said in assumed
+    assert ("wider than the detector" in assumed) == (not wide)
+    if method == "fbp":
+        stitched = ("--half-acquisition", "stitched", "--out", tmp_path / "stitched")
+        assert run("reconstruct", path, *options, *stitched) == 3
+        assert not (tmp_path / "stitched/slices").exists()
+
+
 def test_a_full_turn_whose_axis_is_off_by_a_little_has_the_rim(tmp_path):
     path, bins, center, fine = tmp_path / "scan.npz", 48, 21.5, 8
     away = (np.arange(bins * fine) + 0.5) / fine - 0.5 - center
@@ -174,6 +208,20 @@ def test_an_object_wider_than_the_detector_is_continued(tmp_path):
     assert "extrapolated smoothly" not in assumed
     assert explained.shape == padded.shape
     assert abs((explained[0] - truth)[border].mean()) < 0.3 * bias[1]
+
+
+def test_the_axis_is_that_of_the_rows_that_are_wanted_beside_air(tmp_path):
+    path, stack = tmp_path / "scan.npz", np.zeros((VIEWS, 40, 72))
+    for first, center in ((1, 35.5), (30, 38.0)):
+        save_phantom(path, HALF, 72, center, rows=8)
+        with np.load(path) as scan:
+            stack[:, first : first + 8] = scan["projections"]
+    np.savez(path, projections=stack, angles=HALF)
+    options = ("--kind", "attenuation", "--rows", 30, 38, "--method", "backproject")
+    _, assumed = reconstruct(path, tmp_path / "out", *options)
+    assert "as most show air" in assumed
+    metrics = json.loads((tmp_path / "out/metrics.json").read_text())
+    assert metrics["center"] == pytest.approx(38.0, abs=0.5)
 
 
 def test_the_background_is_brought_to_zero(tmp_path):

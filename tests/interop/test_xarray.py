@@ -8,6 +8,7 @@ import pytest
 import rift_cl as rift
 from rift_cl.errors import DTypeError, InputError, ShapeError
 from rift_cl.interop.xarray import from_xarray, to_xarray
+from rift_cl.reconstruct import widened
 
 xarray = pytest.importorskip("xarray", reason="xarray is not installed")
 
@@ -51,6 +52,14 @@ def test_what_is_labelled_is_read_again(name):
         assert type(found) is type(thing)
         for field, value in fields(thing).items():
             assert np.allclose(fields(found)[field], value, atol=1e-12), field
+
+
+def test_views_of_an_axis_off_the_middle_are_labelled_as_parallel():
+    turn = rift.Parallel(np.arange(40) * np.pi / 20, 6, center=1.2)
+    joined, wide = widened(values_of((40, 6)), turn)
+    values, found = from_xarray(to_xarray(joined, wide))
+    assert isinstance(found, rift.Parallel) and found.center == pytest.approx(wide.center)
+    assert np.array_equal(values, joined)
 
 
 def test_coordinates_are_those_of_the_grid_and_the_scan():

@@ -8,6 +8,7 @@ from axis_scenes import BINS, FULL, HALF, PARTS, grains, sinogram
 import rift_cl as rift
 from rift_cl.errors import InputError, NonFiniteError
 from rift_cl.reconstruct import attenuation, find_center
+from rift_cl.reconstruct.axis import axis_of_stack
 
 ANGLES = {
     "half turn": np.arange(90) * np.pi / 90,
@@ -206,6 +207,42 @@ def test_rows_tell_the_tilt():
     assert found.tilt == pytest.approx(0.4, abs=0.03)
     assert found.spread < 0.1
     np.testing.assert_allclose(found.centers, centers[found.rows.astype(int)], atol=0.1)
+
+
+def _beside_air(slope, first, stop, rows=40):
+    """Noisy rows of air, but for some of an object whose axis leans."""
+    stack = np.random.default_rng(0).normal(0, 0.3, (HALF.size, rows, BINS)).astype(np.float32)
+    for row in range(first, stop):
+        center = 83.2 + slope * (row - (rows - 1) / 2)
+        stack[:, row] = sinogram(PARTS, HALF, center, seed=row, noise=0.005)
+    return stack
+
+
+@pytest.mark.parametrize(("first", "stop"), [(1, 11), (14, 27)])
+@pytest.mark.parametrize("slope", [0.0, 0.2])
+def test_rows_of_air_have_no_vote(first, stop, slope):
+    found = rift.find_center(_beside_air(slope, first, stop), HALF)
+    assert found.rows.min() >= first and found.rows.max() < stop
+    assert found.center == pytest.approx(83.2, abs=0.1)
+    assert found.interval[0] < 83.2 < found.interval[1]
+    assert found.tilt == pytest.approx(slope, abs=0.01)
+    assert f"from {found.rows[0]:.0f} to {found.rows[-1]:.0f}" in found.in_words()
+
+
+def test_rows_that_are_wanted_tell_the_axis_beside_air():
+    stack = _beside_air(0.0, 1, 9)
+    stack[:, 30:38] = 3 * _beside_air(0.0, 30, 38)[:, 30:38, ::-1]
+
+    def look(views, rows):
+        return stack[np.ix_(views, rows)]
+
+    def found(within):
+        return axis_of_stack(lambda row: stack[:, row], look, 40, HALF, None, within)
+
+    assert found((0, 12)).center == pytest.approx(83.2, abs=0.1)
+    assert found((25, 40)).center == pytest.approx(BINS - 1 - 83.2, abs=0.1)
+    with pytest.raises(InputError, match="--center"):
+        found((12, 25))
 
 
 def test_rows_that_contradict_each_other_are_refused():

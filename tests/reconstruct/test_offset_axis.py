@@ -8,12 +8,15 @@ from rift_cl.errors import InputError
 from rift_cl.metrics import psnr
 from rift_cl.reconstruct import FilteredBackprojection
 from rift_cl.reconstruct.direct.offset_axis import (
+    is_bridged,
     is_full_turn,
     is_offset,
     is_uneven,
     is_weighed,
     offset_weights,
+    passes_half,
     widened,
+    widest_hole,
 )
 
 SIZE, BINS, VIEWS, CENTER = 160, 92, 480, 11.3
@@ -74,10 +77,36 @@ def test_a_view_stands_for_its_own_side_where_its_opposite_is_missing():
     best, errors = half_sinogram(CENTER, angles=ANGLES[::8]), []
     for sinogram, scan in (best, half_sinogram(CENTER, angles=angles)):
         image = rift.fbp(rift.Projector(GRID, scan), sinogram)
+        joined, wide = widened(sinogram, scan)
+        np.testing.assert_array_equal(rift.fbp(rift.Projector(GRID, wide), joined), image)
         whole, every = best
         again = rift.Projector(GRID, every)(image)
         errors.append(np.linalg.norm(again - whole) / np.linalg.norm(whole))
     assert errors[1] < 1.5 * errors[0]
+
+
+def test_views_beside_a_hole_stand_for_what_is_missing():
+    """A ball beyond the shorter side keeps its density, up to holes of 15 degrees."""
+    angles = np.delete(ANGLES[::4], range(20, 23))
+    assert not is_full_turn(angles) and is_bridged(angles)
+    scan = rift.Parallel(angles, BINS, center=CENTER)
+    away = np.arange(BINS) - CENTER - 40 * np.cos(angles - 0.6)[:, None]
+    chords = 2 * np.sqrt(np.clip(20.0**2 - away**2, 0, None)).astype(np.float32)
+    image = rift.fbp(rift.Projector(GRID, scan), chords)
+    y, x = (GRID.coordinates(axis) for axis in (0, 1))
+    ball = np.hypot(x - 40 * np.cos(0.6), y[:, None] - 40 * np.sin(0.6)) < 14
+    assert image[ball].mean() == pytest.approx(1, abs=0.02)
+    assert not is_bridged(np.delete(angles, range(20, 23)))
+    first, last = widest_hole(np.append(angles[::-1], angles[:3] + 2 * np.pi))
+    np.testing.assert_allclose([first, last], ANGLES[[76, 92]])
+    first, last = widest_hole(ANGLES[:400])
+    np.testing.assert_allclose([first, last], [ANGLES[399], 2 * np.pi])
+
+
+def test_more_than_half_a_turn_is_clearly_so():
+    degrees = [np.deg2rad(np.arange(span)) for span in (181, 190, 200, 300)]
+    assert [passes_half(angles) for angles in degrees] == [False, False, True, True]
+    assert not passes_half(-degrees[0]) and passes_half(-degrees[3])
 
 
 @pytest.mark.parametrize("center", [11.3, 44.6, 45.2])

@@ -142,7 +142,7 @@ class XrayInput:
         scan = self._geometry()
         if not isinstance(scan, Parallel):
             return seen_grid(scan, 1.0)
-        across = seen_bins(scan)
+        across = seen_bins(scan) if is_offset(scan) else scan.bins
         return Grid((self.rows[1] - self.rows[0], across, across), (self.scan.aspect, 1.0, 1.0))
 
     @property
@@ -250,7 +250,7 @@ class XrayInput:
             return doubted_parallel(
                 scan, line, center, self.tilt, away=away, spanned=spanned, device=self.device
             )
-        found = find_axis(scan, self.device)
+        found = find_axis(scan, self.device, rows=self.settings.rows)
         self.center = found.center
         if tilt is None:
             self.tilt = tilt_worth_turning(found, detector_rows)
@@ -277,11 +277,11 @@ class XrayInput:
         return alignment.aligned(around, first, wanted, self.device)
 
     def _offset_note(self) -> list[str]:
-        """What becomes of parallel rays of a full turn whose axis is near the detector's end."""
+        """What becomes of parallel rays of a turn whose axis is near the detector's end."""
         scan = self._geometry()
         if not isinstance(scan, Parallel) or not is_offset(scan):
             return []
-        return [offset_in_words(scan.center, combined=False)]
+        return [offset_in_words(scan.center, scan.angles, combined=False)]
 
     def _geometry(self) -> Parallel | Cone | Vectors:
         """The rays by what is known of the axis, in lengths of bins as they are seen at it."""

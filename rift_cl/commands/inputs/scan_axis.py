@@ -20,7 +20,7 @@ from rift_cl.errors import InputError, RiftError
 from rift_cl.geometry import Cone, Fan, Vectors
 from rift_cl.geometry.nearly_upright import nearly_upright
 from rift_cl.io.scans.scan_file import ScanFile
-from rift_cl.reconstruct.axis import AxisEstimate, axis_of_rows, searched_rows
+from rift_cl.reconstruct.axis import AxisEstimate, axis_of_stack
 from rift_cl.reconstruct.axis.circular import axis_of_fan, axis_of_scan, orbit_rows
 from rift_cl.reconstruct.axis.fan_doubt import sense_doubt
 from rift_cl.reconstruct.axis.lying_axis import looked_at, lying_axis
@@ -48,13 +48,15 @@ def find_axis(
     *,
     span: tuple[float, float] | None = None,
     zingers: float | None = None,
+    rows: tuple[int, int] | None = None,
 ) -> AxisEstimate:
     """Find the rotation axis of a scan.
 
     Reads a few rows, of a cone those next to the source's orbit, else evenly spread over the whole
-    detector whichever of them are wanted as slices, and uses their line integrals as they are, less
-    zingers where they are to be removed: rings do not turn with the object, so that they contradict
-    every centre alike.
+    detector whichever of them are wanted as slices; where these show air, and so tell no axis, a
+    few that show the object, among those that are wanted. It uses their line integrals as they
+    are, less zingers where they are to be removed: rings do not turn with the object, so that they
+    contradict every centre alike.
 
     Args:
         scan: the scan.
@@ -62,6 +64,7 @@ def find_axis(
             default one if not given. The search itself runs on the host.
         span: first and last bin between which to search; as for ``find_center`` if not given.
         zingers: standard deviations from which on a pixel is one; None where they stay.
+        rows: the first row that is wanted and the one after the last; all if not given.
 
     Raises:
         InputError: the data do not tell the axis; the sentence names the file and says why.
@@ -76,9 +79,10 @@ def find_axis(
             row = scan.shape[1] // 2
             return axis_of_scan(read(row, row + 1)[:, 0], geometry, span)
         count = scan.shape[1]
-        rows = searched_rows(count)
-        sinograms = (read(row, row + 1)[:, 0] for row in rows)
-        found = axis_of_rows(sinograms, rows, count, scan.angles, span)
+        look = partial(_integrals_but_flats, scan)
+        found = axis_of_stack(
+            lambda row: read(row, row + 1)[:, 0], look, count, scan.angles, span, rows
+        )
         return replace(found, aspect=scan.aspect)
     except InputError as error:
         if str(error).startswith(f"{scan.path}: "):

@@ -31,6 +31,7 @@ from rift_cl.geometry import Cone, Vectors
 from rift_cl.io.scans.scan_file import ScanFile
 from rift_cl.reconstruct.axis import AxisEstimate
 from rift_cl.reconstruct.axis.search import angle_doubt
+from rift_cl.reconstruct.direct.offset_axis import is_full_turn, widest_hole
 
 
 @dataclass(frozen=True)
@@ -117,16 +118,37 @@ def found_in_words(found: AxisEstimate, rows: int, spanned: int, tilt: float | N
     return [f"The rotation axis was found {found.in_words()}.", *leans]
 
 
-def offset_in_words(center: float, *, combined: bool) -> str:
-    """What is said of a full turn whose axis is so far off the detector's middle that it matters.
+def offset_in_words(center: float, angles: NDArray[np.float64], *, combined: bool) -> str:
+    """What is said of a turn whose axis is so far off the detector's middle that it matters.
 
     Args:
         center: bin of the axis.
+        angles: of the views, in radians.
         combined: whether opposite views are weighed to make one; otherwise each is used as it is.
     """
-    off = f"The axis, bin {center:.2f}, is off the middle of the detector in a full turn"
+    whole = is_full_turn(angles)
+    turn = "a full turn" if whole else "a turn with a hole"
+    off = f"The axis, bin {center:.2f}, is off the middle of the detector in {turn}"
     joined = "opposite views were combined, and " if combined else ""
-    return f"{off}: {joined}slices extend to the farther end."
+    said = f"{off}: {joined}slices extend to the farther end."
+    return said if whole else f"{said} {_hole_of(angles, combined)}"
+
+
+def hole_in_words(angles: NDArray[np.float64]) -> str:
+    """Where views of a turn lack most, in degrees as their angles count them."""
+    first, last = (math.degrees(angle) for angle in widest_hole(angles))
+    return f"between {first:.4g} and {last:.4g} degrees"
+
+
+def _hole_of(angles: NDArray[np.float64], combined: bool) -> str:
+    """What becomes of a hole in a turn whose axis is off the middle."""
+    lacking = f"There is no view {hole_in_words(angles)}"
+    if combined:
+        return f"{lacking}: those beside them stand for what is missing."
+    return (
+        f"{lacking}: what they alone would show of the part beyond the detector's nearer end is "
+        "less certain."
+    )
 
 
 def doubted_parallel(

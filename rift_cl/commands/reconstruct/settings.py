@@ -118,8 +118,8 @@ class GeometryOptions:
     """File with the bin of the rotation axis in every detector row (.txt, .csv or .npy), for an
     axis that drifts; replaces --center and --tilt."""
     half_acquisition: Expert[Literal["weighted", "stitched"]] = "weighted"
-    """For full turns with the axis off the middle of the detector: weight opposite views, or stitch
-    them into wider views over 180 degrees."""
+    """For full turns with the axis off the middle of the detector: weight opposite views, which
+    may leave a hole of 15 degrees, or stitch them into wider views over 180 degrees."""
     rows: Auto[tuple[int, int]] = None
     """First detector row and the one after the last; of cone beams, slices of the volume. Default:
     all."""

@@ -31,7 +31,12 @@ from rift_cl.commands.inputs.scan_rows import (
     chosen_rows,
     scan_identity,
 )
-from rift_cl.commands.inputs.told_axis import doubted_parallel, found_in_words, offset_in_words
+from rift_cl.commands.inputs.told_axis import (
+    doubted_parallel,
+    found_in_words,
+    hole_in_words,
+    offset_in_words,
+)
 from rift_cl.commands.reconstruct.binned_file import binned_file, row_binning
 from rift_cl.commands.reconstruct.clean_rows import CleanRows, LoadedRows
 from rift_cl.commands.reconstruct.settings import ReconstructSettings
@@ -44,14 +49,17 @@ from rift_cl.reconstruct import Attenuation
 from rift_cl.reconstruct.axis import AxisEstimate
 from rift_cl.reconstruct.direct.fan_rebin import covered_rays, rebin_fan
 from rift_cl.reconstruct.direct.offset_axis import (
+    is_bridged,
     is_full_turn,
     is_offset,
-    is_uneven,
+    passes_half,
     seen_bins,
+    sees_further,
+    shows_both_sides,
     widened,
 )
 from rift_cl.reconstruct.direct.padding import extended, is_truncated, wider
-from rift_cl.reconstruct.direct.redundancy import redundancy
+from rift_cl.reconstruct.direct.redundancy import ITERATE, redundancy
 from rift_cl.reconstruct.preprocess import binned_center, binning_note, stitched
 from rift_cl.reconstruct.solvers.variation_weight import noise_of_rays
 
@@ -117,7 +125,7 @@ class SliceInput:
         # Made now, so that a bad pitch or center is told before any work.
         self.fan = self._fan()
         self.geometry = self._geometry()
-        # Whether a full turn's axis is so far off the middle that slices reach beyond the detector.
+        # Whether a turn's axis is so far off the middle that slices reach beyond the detector.
         self.offset = self._sees_farther()
         # Whether the object reaches beyond the farther end, too.
         self.beyond = False
@@ -168,7 +176,7 @@ class SliceInput:
     @property
     def most_bins(self) -> int:
         """The most that ``bins`` may come to once the axis is known."""
-        may_grow = not self.settled and is_full_turn(self.scan.angles)
+        may_grow = not self.settled and self._goes_round(self.scan.angles)
         return 2 * self.bins if may_grow else self.bins
 
     def locate(self, *, doubt: bool = True) -> None:
@@ -181,7 +189,7 @@ class SliceInput:
                 as long as finding it.
 
         Raises:
-            InputError: the axis cannot be found.
+            InputError: the axis cannot be found, or views are to be stitched that cannot be.
         """
         middle = sum(self.rows) // 2
         read = self.clean.read(middle, middle + 1)
@@ -201,11 +209,9 @@ class SliceInput:
         self.axis = self._axis_record()
         self.clean.alignment = self._alignment()
         self.offset = self._sees_farther()
-        if (
-            self.offset
-            and self.settings.half_acquisition == "stitched"
-            and isinstance(self.geometry, Parallel)
-        ):
+        if self.settings.half_acquisition == "stitched" and self.off_middle:
+            assert isinstance(self.geometry, Parallel)
+            self._check_full_turn()
             self.stitched, self.offset = self.geometry, False
             row, self.geometry = stitched(row, self.stitched, device=self.device)
         # What one side of the detector misses is no truncation where the other side has it.
@@ -270,7 +276,8 @@ class SliceInput:
             self.settled_by = settled_axis(self.file, center, self.device, zingers=zingers)
             self.center, self.turned = self.settled_by.center, self.settled_by.turned
             return
-        self.estimate = find_axis(self.file, self.device, zingers=zingers)
+        rows = self.settings.rows
+        self.estimate = find_axis(self.file, self.device, zingers=zingers, rows=rows)
         self.center = self.estimate.center
         if self.settings.tilt is None:
             self.tilt = tilt_worth_turning(self.estimate, self.file.shape[1])
@@ -314,14 +321,9 @@ class SliceInput:
     def _both_sides(self, projections: Floats) -> tuple[Floats, Parallel | Fan]:
         """Parallel projections of a full turn with what either side of the detector sees."""
         scan = self.geometry
-        if (
-            not isinstance(scan, Parallel)
-            or self.rebinned
-            or not is_full_turn(scan.angles)
-            or not is_uneven(scan.center, scan.bins)
-        ):
-            return projections, scan
-        return widened(projections, scan)
+        if isinstance(scan, Parallel) and not self.rebinned and shows_both_sides(scan):
+            return widened(projections, scan)
+        return projections, scan
 
     def formula_geometry(self) -> Parallel | Fan:
         """What ``for_formula`` would say of the geometry."""
@@ -402,8 +404,36 @@ class SliceInput:
         pivot = binned_center((self.file.shape[1] - 1) / 2, block)
         return Alignment(self.geometry.center, pivot, tilt, aspect=self.scan.aspect)
 
+    @property
+    def off_middle(self) -> bool:
+        """Whether parallel rays were measured further on one side of the axis than on the other."""
+        scan = self.geometry
+        if not isinstance(scan, Parallel) or self.rebinned:
+            return False
+        return sees_further(scan.center, scan.bins)
+
     def _sees_farther(self) -> bool:
-        return not self.rebinned and is_offset(self.geometry)
+        if isinstance(self.geometry, Fan):
+            return is_offset(self.geometry)
+        return self.off_middle and self._goes_round(self.geometry.angles)
+
+    def _goes_round(self, angles: NDArray[np.float64]) -> bool:
+        """Whether the method makes slices to the farther end of parallel views at these angles."""
+        return passes_half(angles) if self.settings.iterative else is_bridged(angles)
+
+    def _check_full_turn(self) -> None:
+        """Refuse to stitch views that are no full turn.
+
+        Raises:
+            InputError: they are none.
+        """
+        if is_full_turn(self.geometry.angles):
+            return
+        raise InputError(
+            f"{self.file.path}: --half-acquisition stitched joins the opposite views of a full "
+            f"turn, and there is no view {hole_in_words(self.geometry.angles)}; --half-acquisition "
+            f"weighted bridges up to 15 degrees, and {ITERATE} (--method)"
+        )
 
     def _axis_record(self) -> dict[str, Any]:
         if self.settings.center is not None:
@@ -438,6 +468,8 @@ def _notes_of(source: SliceInput) -> list[str]:
         )
     if source.offset:
         notes.append(_offset_note(source))
+    elif source.off_middle and passes_half(source.geometry.angles):
+        notes.append(_one_sided_note(source))
     notes += _gap_note(source.geometry.angles)
     notes += source.clean.notes()
     if source.scan.background:
@@ -531,8 +563,21 @@ def _offset_note(source: SliceInput) -> str:
         " The object reaches beyond that end as well: values near the border of the field of view "
         "are too large."
     )
-    words = offset_in_words(source.axis["center"], combined=not source.settings.iterative)
+    words = offset_in_words(
+        source.axis["center"], source.geometry.angles, combined=not source.settings.iterative
+    )
     return f"{words}{beyond if source.beyond else ''}"
+
+
+def _one_sided_note(source: SliceInput) -> str:
+    """What is said of an axis off the middle where opposite views cannot be combined."""
+    scan = source.geometry
+    return (
+        f"The axis, bin {source.axis['center']:.2f}, is off the middle of the detector, and the "
+        f"views do not go all round (none {hole_in_words(scan.angles)}): objects that reach "
+        f"further from the axis than {min(scan.center, scan.bins - 1 - scan.center):.4g} bins are "
+        f"not right; {ITERATE} (--method)."
+    )
 
 
 def _wide_note(source: SliceInput) -> str:

@@ -11,14 +11,13 @@ cones, whose rays ``fan_rays`` reads as parallel views, and ``sense`` which way 
 from rift_cl.reconstruct.axis.center import find_center
 from rift_cl.reconstruct.axis.circular import axis_of_scan
 from rift_cl.reconstruct.axis.estimate import AxisEstimate
-from rift_cl.reconstruct.axis.search import axis_of_rows, searched_rows
+from rift_cl.reconstruct.axis.search import axis_of_stack
 from rift_cl.reconstruct.axis.sense import Sense
 
 __all__ = [
     "AxisEstimate",
     "Sense",
-    "axis_of_rows",
     "axis_of_scan",
+    "axis_of_stack",
     "find_center",
-    "searched_rows",
 ]

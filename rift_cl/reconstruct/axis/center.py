@@ -11,7 +11,7 @@ from rift_cl.errors import ShapeError
 from rift_cl.geometry import Cone, Fan, Parallel, Vectors
 from rift_cl.reconstruct.axis.circular import axis_of_scan
 from rift_cl.reconstruct.axis.estimate import AxisEstimate
-from rift_cl.reconstruct.axis.search import axis_of_rows, searched_rows
+from rift_cl.reconstruct.axis.search import axis_of_stack
 
 Floats = NDArray[np.float64]
 
@@ -32,8 +32,9 @@ def find_center(
 
     Args:
         sinogram: line integrals, (angle, bin) or (angle, row, bin); of a stack, at most five rows
-            are looked at, evenly chosen; of a cone those near the row ``center[0]``, as they are
-            or averaged in at most five groups.
+            are looked at, evenly chosen, or among those that show the object where most show air;
+            of a cone those near the row ``center[0]``, as they are or averaged in at most five
+            groups.
         angles: directions in radians, in any order; or the scan, ``Parallel``, ``Fan`` or
             ``Cone``, whose centre (bin) and sense need not be right.
         span: where to search, in bins; for half turns the middle 60 % of the detector if not
@@ -63,5 +64,9 @@ def find_center(
     wanted = (directions.size, *shape[1:-1], scan.bins)
     y = as_host_array(sinogram, wanted, name="sinogram", wants="find_center")
     stack = y if y.ndim == 3 else y[:, None]
-    rows = searched_rows(stack.shape[1])
-    return axis_of_rows((stack[:, row] for row in rows), rows, stack.shape[1], directions, span)
+
+    def look(views: list[int], rows: list[int]) -> NDArray[np.float32]:
+        seen: NDArray[np.float32] = stack[np.ix_(views, rows)]
+        return seen
+
+    return axis_of_stack(lambda row: stack[:, row], look, stack.shape[1], directions, span)

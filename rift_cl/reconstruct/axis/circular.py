@@ -176,7 +176,7 @@ def _settled(
         sinograms = (views[:, row] for row in range(views.shape[1]))
         # Rows counted from the one that the estimate is for.
         offsets = list(places - middle)
-        told = searched_axis(sinograms, offsets, 1, read.directions, within, seen)
+        told = searched_axis(sinograms, offsets, 0.0, read.directions, within, seen)
         found = _on_detector(told, bins, middle)
         change = found.center - fan.center
         fan = replace(fan, center=found.center)

@@ -40,6 +40,7 @@ class AxisEstimate:
         sense: of rotation, as fans and cones tell it; None for parallel beams, which do not.
         doubt: what the data have against the scan's angles or lengths; empty where nothing.
         aspect: distance between rows over that between bins.
+        beside_air: whether rows were chosen that show the object, as most show air.
     """
 
     center: float
@@ -54,6 +55,7 @@ class AxisEstimate:
     sense: Sense | None = None
     doubt: str = ""
     aspect: float = 1.0
+    beside_air: bool = False
 
     def degrees(self, slope: float) -> float:
         """The angle of an axis that moves by so many bins from one row to the next."""
@@ -102,9 +104,12 @@ class AxisEstimate:
     def in_words(self) -> str:
         """Where the axis is, how surely, and what told it."""
         low, high = self.interval
+        rows = f"{self.rows.size} rows"
+        if self.beside_air:
+            rows += f" from {self.rows[0]:.0f} to {self.rows[-1]:.0f}, as most show air"
         said = (
             f"at bin {self.center:.2f} ({low:.2f} to {high:.2f} at 95 % confidence, by {self.by} "
-            f"in {self.rows.size} rows)"
+            f"in {rows})"
         )
         said = said if self.sense is None else f"{said}; {self.sense.in_words()}"
         return f"{said}; {self.doubt}" if self.doubt else said

@@ -7,7 +7,7 @@ contradict each other, nothing stands out, or the interval comes out too wide, n
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -18,6 +18,7 @@ from rift_cl.reconstruct.axis.estimate import AxisEstimate
 from rift_cl.reconstruct.axis.measures import RowAxis, chosen_measure
 from rift_cl.reconstruct.axis.moments import mass_doubt
 from rift_cl.reconstruct.axis.repeated import repeated_angles
+from rift_cl.reconstruct.axis.shown_rows import Look, evenly, rows_beside_air
 from rift_cl.reconstruct.axis.turn import other_turn
 from rift_cl.reconstruct.axis.view_order import jump_doubt, order_doubt
 from rift_cl.reconstruct.axis.views import Views, is_cut, without_rings
@@ -54,14 +55,77 @@ _REACH, _STEP = 8.0, 0.05
 
 def searched_rows(count: int) -> list[int]:
     """Detector rows used by a search: evenly spaced, the middle one included."""
-    taken = min(_ROWS, count)
-    return [int((index + 0.5) * count / taken) for index in range(taken)]
+    return evenly(count, _ROWS)
+
+
+def axis_of_stack(
+    read: Callable[[int], Views],
+    look: Look,
+    count: int,
+    angles: Floats,
+    span: tuple[float, float] | None = None,
+    within: tuple[int, int] | None = None,
+) -> AxisEstimate:
+    """Find the axis from rows that are evenly spread, or else from those that show the object.
+
+    Args:
+        read: gives the line integrals of a row, (angle, bin).
+        look: gives some rows of some views, as for ``rows_beside_air``.
+        count: of the detector's rows.
+        angles: directions in radians.
+        span: where to search, in bins.
+        within: the first row and the one after the last among which rows that show the object are
+            chosen; all if not given.
+
+    Raises:
+        InputError: as for ``axis_of_rows``.
+    """
+
+    def found(rows: list[int], place: float) -> AxisEstimate:
+        return axis_of_rows((read(row) for row in rows), rows, place, angles, span)
+
+    usual = searched_rows(count)
+    try:
+        return found(usual, (count - 1) / 2)
+    except InputError as error:
+        if GIVE_IT not in str(error):
+            raise
+        shown = rows_beside_air(usual, look, angles.size, within or (0, count))
+        if shown is None:
+            raise
+    beside = (shown[0] + shown[-1]) / 2
+    return _moved(found(shown, beside), (count - 1) / 2 - beside)
+
+
+def _moved(found: AxisEstimate, away: float) -> AxisEstimate:
+    """The axis of rows beside air, moved so many rows to the detector's middle.
+
+    It goes along a tilt that is sure; one that is not would move it by what is noise, and the axis
+    is taken as upright.
+
+    Raises:
+        InputError: the interval there is too wide.
+    """
+    if not found.tilt_is_sure:
+        return replace(found, tilt=0.0, beside_air=True)
+    center = found.center + found.tilt * away
+    half = (found.interval[1] - found.interval[0]) / 2
+    half = float(np.hypot(half, _HALF_INTERVAL * found.tilt_error * away))
+    if not half <= _WIDEST:
+        raise _refusal(_too_wide(half))
+    return replace(
+        found,
+        center=center,
+        interval=(center - half, center + half),
+        scores=found.scores + np.array([[found.tilt * away], [0.0]]),
+        beside_air=True,
+    )
 
 
 def axis_of_rows(
     sinograms: Iterable[Views],
     rows: Sequence[float],
-    count: int,
+    place: float,
     angles: Floats,
     span: tuple[float, float] | None = None,
 ) -> AxisEstimate:
@@ -70,7 +134,7 @@ def axis_of_rows(
     Args:
         sinograms: line integrals of each row, (angle, bin).
         rows: their numbers.
-        count: of all the detector's rows, whose middle the estimate is for.
+        place: the row that the estimate is for.
         angles: directions in radians.
         span: where to search, in bins.
 
@@ -87,7 +151,7 @@ def axis_of_rows(
             yield views
 
     try:
-        found = searched_axis(watched(), rows, count, angles, span)
+        found = searched_axis(watched(), rows, place, angles, span)
     except InputError as error:
         doubt = angle_doubt(middle[0], angles) if middle else ""
         if not doubt:
@@ -126,7 +190,7 @@ def _scatter_doubt(found: AxisEstimate) -> str:
 def searched_axis(
     sinograms: Iterable[Views],
     rows: Sequence[float],
-    count: int,
+    place: float,
     angles: Floats,
     span: tuple[float, float] | None = None,
     seen: Floats | None = None,
@@ -152,7 +216,7 @@ def searched_axis(
             found.append(told)
     if 2 * len(found) <= len(rows):
         raise _refusal(why)
-    return _line(np.array(places, float), found, (count - 1) / 2)
+    return _line(np.array(places, float), found, place)
 
 
 def _check_searchable(views: Views, span: tuple[float, float] | None) -> None:

@@ -51,6 +51,7 @@ from rift_cl.reconstruct.direct.fdk import (
 )
 from rift_cl.reconstruct.direct.katsevich import Katsevich, cone_inversion
 from rift_cl.reconstruct.direct.offset_axis import (
+    OwnSideViews,
     is_offset,
     is_weighed,
     offset_weights,
@@ -72,10 +73,10 @@ class FilteredBackprojection(Composite):
             ``high-pass``), a filter, or a function of frequency.
         compensate: what each view stands for. ``uniform``: every view the same. ``voronoi``: half
             the gaps to its neighbours; in a half acquisition to those on the whole circle, as the
-            opposite ones show another side. None: as ``voronoi`` where no gap is a hole, else as
-            ``uniform``. ``capped-voronoi``, ``pipe-menon`` and ``exact`` depend on frequency, and
-            are the ones for random, clustered and limited angles; on even angles they are the
-            plain ramp.
+            opposite ones show another side. None: as ``voronoi`` in a half acquisition and where
+            no gap is a hole, else as ``uniform``. ``capped-voronoi``, ``pipe-menon`` and ``exact``
+            depend on frequency, and are the ones for random, clustered and limited angles; on even
+            angles they are the plain ramp.
         diameter: of the object, for these three, in the grid's unit of length; that of the
             circle in the grid that the detector sees if not given.
 
@@ -209,7 +210,8 @@ def fbp(
         A: the projector that describes grid and scan. Parallel views that cover less than half a
             turn are taken as they are: what lies between the first and the last is missing from
             the image. Those of a full turn whose axis is off the middle of the detector are weighed
-            so that every line counts once, to the end of its longer side. A cone's source goes
+            so that every line counts once, to the end of its longer side; where it is far off, the
+            turn may have a hole of up to 15 degrees. A cone's source goes
             round a full turn or half a turn and the fan; the rotation axis may be near one side of
             the detector in a full turn (see ``FDK``). Or it goes along an even helix (see
             ``Katsevich``).
@@ -320,9 +322,12 @@ def _gains(scan: Parallel, compensate: str | None, diameter: float) -> Floats | 
     A view of a half acquisition shows what is on its own side of the axis. Where the one from the
     opposite side is missing it shows no more, so that it stands for its share of the whole circle.
     """
-    own_side = compensate not in COMPENSATIONS and is_offset(scan)
+    own_side = is_offset(scan) or isinstance(scan, OwnSideViews)
+    own_side = own_side and compensate not in COMPENSATIONS
+    if not own_side:
+        return view_gains(scan.angles, compensate, diameter)
     # Twice around for halves of angles is once around.
-    return view_gains(scan.angles / 2 if own_side else scan.angles, compensate, diameter)
+    return view_gains(scan.angles / 2, compensate or "voronoi", diameter)
 
 
 def _scaled(gains: Floats | Compensation, factor: float) -> Gains:
