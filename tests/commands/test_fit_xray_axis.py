@@ -9,6 +9,8 @@ import pytest
 
 import rift_cl as rift
 from rift_cl.commands.cli import main
+from rift_cl.commands.fit_xray.settings import FitXraySettings
+from rift_cl.commands.python_words import in_python
 from rift_cl.commands.fit_xray.job import XrayFit
 from rift_cl.commands.fit_xray.settings import FitXraySettings
 from rift_cl.geometry.seen_grid import seen_grid
@@ -167,7 +169,7 @@ def test_a_tilt_that_is_not_sure_is_told(tmp_path):
     sliced = rift.reconstruct_scan(path, tmp_path / "slices", rows=(0, 1))
     _, said, _ = fitted(path, tmp_path / "fit")
     (sentence,) = (note for note in sliced.notes if "projections were not turned" in note)
-    assert sentence in said
+    assert sentence in in_python(said, FitXraySettings)
 
 
 def test_a_tilt_that_is_no_misalignment_is_refused(tmp_path, capsys):
