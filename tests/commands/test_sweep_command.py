@@ -84,6 +84,19 @@ def test_what_is_refused_before_any_run(scans, tmp_path, vary, said):
     assert not (tmp_path / "out").exists()
 
 
+@pytest.mark.parametrize(
+    ("inputs", "names"),
+    [
+        (("day1/scan.h5", "day2/scan.h5", "day2/flat.h5"), ["day1-scan", "day2-scan", "flat"]),
+        (("one/day/a.h5", "two/day/a.h5"), ["one-day-a", "two-day-a"]),
+        (("day/a.h5", "day/a.npz"), ["a.h5", "a.npz"]),
+    ],
+)
+def test_inputs_of_one_name_are_told_apart_by_folders_and_endings(tmp_path, inputs, names):
+    runs = variations(sweep([tmp_path / name for name in inputs], tmp_path / "out", ()))
+    assert [run.name for run in runs] == names
+
+
 def test_a_setting_of_all_runs_is_given_once(scans, tmp_path):
     given = sweep(scans[:1], tmp_path / "out", ("size=4",))
     with pytest.raises(InputError, match="center is given twice"):
