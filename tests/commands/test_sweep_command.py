@@ -139,7 +139,10 @@ def test_a_run_that_cannot_be_done_is_told_beside_the_others(scans, tmp_path, ca
     assert run("sweep", "reconstruct", scans[0], *words, "--out", tmp_path / "out") == 0
     told = capsys.readouterr()
     assert "--rows is 0 9" in told.err and "│ 0 1 " in told.out
-    assert "--rows is 0 9" in (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
+    assert "1 of 2 runs could not be done" in told.out
+    assert told.out.index("The first is rows=0-9: ") < told.out.index("--rows is 0 9")
+    page = (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
+    assert "--rows is 0 9" in page and "why it could not be done<" in page
     words = ("--fixed", "kind=attenuation", "center=7.5", "rows=0 9")
     assert run("sweep", "reconstruct", scans[0], *words, "--out", tmp_path / "none") == INPUT
     capsys.readouterr()
