@@ -99,12 +99,21 @@ def main() -> int:
 def _compare(settings: Settings) -> int:
     plan = settings.plan()
     make_folder(plan.out)
-    if not settings.report_only:
-        device = open_device(settings.device)
-        for study in STUDIES:
-            if not settings.only or study.NAME in settings.only:
-                print(f"{study.TITLE} ...", file=sys.stderr)
-                show_progress(_computed(study, plan, device), quiet=False)
+    try:
+        if not settings.report_only:
+            device = open_device(settings.device)
+            for study in STUDIES:
+                if not settings.only or study.NAME in settings.only:
+                    print(f"{study.TITLE} ...", file=sys.stderr)
+                    show_progress(_computed(study, plan, device), quiet=False)
+    finally:
+        # A study that fails leaves the report of what there is.
+        _report(plan)
+    return 0
+
+
+def _report(plan: Plan) -> None:
+    """Draw and print what the files have."""
     records = {study.NAME: _read(plan.out / f"{study.NAME}.json") for study in STUDIES}
     shown = [(study, records[study.NAME]) for study in STUDIES if records[study.NAME]]
     _write_report(plan.out, shown)
@@ -112,7 +121,6 @@ def _compare(settings: Settings) -> int:
         show(_all_tables(study, record["result"]))
         print("\n".join(study.verdicts(record["result"])), end="\n\n")
     print(f"bases.md and report.html are in {plan.out}")
-    return 0
 
 
 def _computed(study: ModuleType, plan: Plan, device: Device) -> Iterator[Report]:

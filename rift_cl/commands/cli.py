@@ -430,6 +430,8 @@ def _sweep(settings: Any, output: Output) -> None:
     if not ran(job, settings, output):
         return
     print_table(*score_table(job.rows, most=_FIGURES))
+    if job.refusal:
+        print(job.refusal)
     print(f"report.html, sweep.csv and the folders of the runs are in {settings.out}")
 
 

@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from rift_cl.errors import InputError
 from rift_cl.geometry.cone import Cone
 from rift_cl.geometry.fan import Fan
 from rift_cl.geometry.grid import Grid
@@ -18,6 +19,8 @@ from rift_cl.geometry.vectors import Vectors
 _BESIDE = 4
 # Least cosine of the angle to a direction along which a detector's edge, or a view, mostly is.
 _MOSTLY = math.sqrt(0.5)
+# Share of the views that may look past the axis before the volume is taken to stand elsewhere.
+_PAST = 0.25
 # What differs by no more than rounding is the same.
 _SAME = 1e-9
 
@@ -51,8 +54,7 @@ def scan_lengths(scan: Fan | Cone | Vectors) -> ScanLengths:
         scan: a fan's pitch counts for rows as well.
     """
     if isinstance(scan, Vectors):
-        normal = np.cross(scan.across, scan.down)
-        normal /= np.linalg.norm(normal, axis=1, keepdims=True)
+        normal = _normals(scan)
         to_detector = np.abs(((scan.middle - scan.source) * normal).sum(axis=1))
         to_axis = to_detector * _share_to_axis(scan, normal)
         beside = np.hypot(scan.source[:, 0], scan.source[:, 1])
@@ -63,6 +65,12 @@ def scan_lengths(scan: Fan | Cone | Vectors) -> ScanLengths:
         return ScanLengths(*lengths, (float(pitch[0]), float(pitch[1])))
     pitch_of = scan.pitch if isinstance(scan, Cone) else (scan.pitch, scan.pitch)
     return ScanLengths(scan.source_to_axis, scan.source_to_detector, pitch_of)
+
+
+def _normals(scan: Vectors) -> Floats:
+    """Unit vectors across the detector, (views, 3)."""
+    normal = np.cross(scan.across, scan.down)
+    return np.asarray(normal / np.linalg.norm(normal, axis=1, keepdims=True))
 
 
 def _share_to_axis(scan: Vectors, normal: Floats) -> Floats:
@@ -90,11 +98,13 @@ def seen_grid(scan: Fan | Cone | Vectors, spacing: float | None = None) -> Grid:
         spacing: edge of a voxel; a bin as it is seen at the axis if not given.
 
     Raises:
-        InputError: the spacing is no positive length.
+        InputError: the spacing is no positive length, or vectors look past the axis x = y = 0 at
+            another place.
     """
     row, bin = scan_lengths(scan).pixel
     edge = bin if spacing is None else checked_length("seen_grid", "spacing", spacing)
     if isinstance(scan, Vectors):
+        check_axis(scan)
         width, low, high = _reach_of_vectors(scan)
     else:
         center = scan.center if isinstance(scan, Fan) else scan.center[1]
@@ -105,6 +115,29 @@ def seen_grid(scan: Fan | Cone | Vectors, spacing: float | None = None) -> Grid:
         return Grid((across, across), edge)
     along = max(1, _whole((high - low) / edge))
     return Grid((along, across, across), edge, ((low + high) / 2, 0, 0))
+
+
+def check_axis(scan: Vectors) -> None:
+    """Refuse vectors that turn about another axis than the one that a grid is centred on.
+
+    Views may stand anywhere, so that some may look past the axis; but where many do, and more of
+    them see the place that their middle rays pass nearest, the object is there.
+
+    Raises:
+        InputError: it is.
+    """
+    seen = _views_of_axis(scan)
+    if seen >= (1 - _PAST) * scan.views:
+        return
+    x, y, _ = _looked_at(scan)
+    moved = scan.source - [x, y, 0], scan.middle - [x, y, 0]
+    about = _views_of_axis(Vectors(*moved, scan.across, scan.down, scan.rows, scan.bins))
+    if about > seen:
+        raise InputError(
+            f"{seen} of {scan.views} views see the axis x = y = 0, on which the volume is centred, "
+            f"and {about} see x = {x:.4g}, y = {y:.4g}, near which their middle rays pass: "
+            f"subtract ({x:.6g}, {y:.6g}, 0) from the places of source and detector in the vectors"
+        )
 
 
 def slices_beyond(scan: Cone | Vectors, grid: Grid) -> tuple[int, int]:
@@ -160,6 +193,30 @@ def _rows_of_cone(scan: Cone, row: float) -> tuple[float, float]:
     first = (-0.5 - scan.center[0]) * row + float(scan.heights.min())
     last = (scan.rows - 0.5 - scan.center[0]) * row + float(scan.heights.max())
     return first, last
+
+
+def _looked_at(scan: Vectors) -> Floats:
+    """The point whose squared distances from the rays to the detector's middle sum to the least."""
+    ahead = scan.middle - scan.source
+    ahead /= np.linalg.norm(ahead, axis=1, keepdims=True)
+    beside = np.eye(3) - ahead[:, :, None] * ahead[:, None, :]
+    across_rays = (beside @ scan.source[:, :, None]).sum(axis=0)[:, 0]
+    # Of rays that are all parallel it is the one nearest the origin.
+    place = np.linalg.pinv(beside.sum(axis=0), rcond=_SAME) @ across_rays
+    return np.where(np.abs(place) > _SAME * np.abs(place).max(), place, 0)
+
+
+def _views_of_axis(scan: Vectors) -> int:
+    """The number of views with a shadow of the axis, where their middle rays pass it."""
+    ahead = scan.middle - scan.source
+    share = _share_to_axis(scan, _normals(scan))
+    place = np.zeros_like(ahead)
+    place[:, 2] = (scan.source + share[:, None] * ahead)[:, 2]
+    # A place is so many bins, rows and ways to the middle from the source, times its depth.
+    basis = np.stack([scan.across, scan.down, ahead], axis=2)
+    bins, rows, depth = np.linalg.solve(basis, (place - scan.source)[:, :, None])[:, :, 0].T
+    inside = (2 * np.abs(bins) <= scan.bins * depth) & (2 * np.abs(rows) <= scan.rows * depth)
+    return int(np.count_nonzero(inside & (depth > 0)))
 
 
 def _reach_of_vectors(scan: Vectors) -> tuple[float, float, float]:

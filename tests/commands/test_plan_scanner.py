@@ -10,7 +10,11 @@ import numpy as np
 import pytest
 
 from rift_cl.commands.cli import main
-from rift_cl.geometry import Cone
+from rift_cl.commands.plan.scanner import vectors_of
+from rift_cl.geometry import Camera, Cone
+from rift_cl.geometry.leaning import leaning
+from rift_cl.geometry.pose import look_at
+from rift_cl.geometry.seen_grid import seen_grid
 from rift_cl.io.scans.geometries.astra_vectors import read_vectors
 
 R, S, ROWS, BINS, PITCH = 60.0, 90.0, 12, 16, 3.0
@@ -83,6 +87,22 @@ def test_vectors_are_those_of_the_scanner_at_these_places(on_orbit):
     wanted = Cone(azimuths + np.pi / 2, ROWS, BINS, PITCH, R, S).vectors()
     for name in ("source", "middle", "across", "down"):
         np.testing.assert_allclose(getattr(found, name), getattr(wanted, name), atol=1e-3)
+
+
+def test_planned_views_hold_the_detector_as_the_scanner_does():
+    """Aside, off the orbit's plane and rolled: those of further views of the same scanner."""
+    more = np.deg2rad([130.0, 145.0])
+    first, further = (
+        leaning(Cone(angles, ROWS, BINS, PITCH, R, S, (2.0, 11.0)), 0.05) for angles in (SEEN, more)
+    )
+    middle = seen_grid(first).center[::-1]
+    cameras = tuple(
+        Camera((ROWS, BINS), np.eye(3), look_at(source, middle, (0, 0, 1)))
+        for source in further.source
+    )
+    planned = vectors_of(cameras, first)
+    for name in ("source", "middle", "across", "down"):
+        np.testing.assert_allclose(getattr(planned, name), getattr(further, name), atol=1e-9)
 
 
 def test_a_plan_of_no_scanner_keeps_no_vectors_of_an_earlier_one(on_orbit, tmp_path):

@@ -85,6 +85,16 @@ def test_a_run_goes_on_with_a_part_that_a_worker_made(scan, tmp_path, monkeypatc
     assert volume.tobytes() == made(Reconstruction(settings(scan, tmp_path / "b")))[0].tobytes()
 
 
+def test_a_worker_tells_which_weights_it_chose(scan, tmp_path):
+    tv = {"method": "tv", "steps": 2}
+    _, token = begin_anew(settings(scan, tmp_path / "out", **tv))
+    receipt = make_slices(settings(scan, tmp_path / "out", resume=True, **tv), (), token, 2, 4)
+    assert sorted(receipt.weights) == sorted(receipt.residuals) == [2, 3]
+    job = Reconstruction(settings(scan, tmp_path / "b", **tv))
+    job.take(receipt)
+    assert job.inversion.figures()["weight"] == pytest.approx(sum(receipt.weights.values()) / 2)
+
+
 def test_a_worker_leaves_doubts_to_the_process_that_began_the_run(scan, tmp_path, monkeypatch):
     """They take as long as the search for the axis."""
     kept, token = begin_anew(settings(scan, tmp_path / "out"))

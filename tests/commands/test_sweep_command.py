@@ -84,6 +84,19 @@ def test_what_is_refused_before_any_run(scans, tmp_path, vary, said):
     assert not (tmp_path / "out").exists()
 
 
+@pytest.mark.parametrize(
+    ("inputs", "names"),
+    [
+        (("day1/scan.h5", "day2/scan.h5", "day2/flat.h5"), ["day1-scan", "day2-scan", "flat"]),
+        (("one/day/a.h5", "two/day/a.h5"), ["one-day-a", "two-day-a"]),
+        (("day/a.h5", "day/a.npz"), ["a.h5", "a.npz"]),
+    ],
+)
+def test_inputs_of_one_name_are_told_apart_by_folders_and_endings(tmp_path, inputs, names):
+    runs = variations(sweep([tmp_path / name for name in inputs], tmp_path / "out", ()))
+    assert [run.name for run in runs] == names
+
+
 def test_a_setting_of_all_runs_is_given_once(scans, tmp_path):
     given = sweep(scans[:1], tmp_path / "out", ("size=4",))
     with pytest.raises(InputError, match="center is given twice"):
@@ -126,7 +139,10 @@ def test_a_run_that_cannot_be_done_is_told_beside_the_others(scans, tmp_path, ca
     assert run("sweep", "reconstruct", scans[0], *words, "--out", tmp_path / "out") == 0
     told = capsys.readouterr()
     assert "--rows is 0 9" in told.err and "│ 0 1 " in told.out
-    assert "--rows is 0 9" in (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
+    assert "1 of 2 runs could not be done" in told.out
+    assert told.out.index("The first is rows=0-9: ") < told.out.index("--rows is 0 9")
+    page = (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
+    assert "--rows is 0 9" in page and "why it could not be done<" in page
     words = ("--fixed", "kind=attenuation", "center=7.5", "rows=0 9")
     assert run("sweep", "reconstruct", scans[0], *words, "--out", tmp_path / "none") == INPUT
     capsys.readouterr()

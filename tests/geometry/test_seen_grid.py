@@ -77,6 +77,39 @@ def test_a_detector_on_its_side_is_as_high_as_it_is_long():
     assert seen_grid(lying) == seen_grid(seen)
 
 
+def moved(scan, *place):
+    """The same views about another place."""
+    ends = scan.source + np.array(place), scan.middle + np.array(place)
+    return rift.Vectors(*ends, scan.across, scan.down, scan.rows, scan.bins)
+
+
+def test_views_that_look_past_the_axis_are_told_where_they_look():
+    views = rift.Cone(ANGLES, 9, 16, 0.8, 50, 100).vectors()
+    for place in ((20, -8, 3), (0, 30, 0)):
+        with pytest.raises(InputError, match=rf"subtract \({place[0]}, {place[1]}, 0\)"):
+            seen_grid(moved(views, *place))
+    # Wherever along the axis, and with the object still in the volume.
+    for place in ((0, 0, 40), (2, 1, 0)):
+        assert seen_grid(moved(views, *place)).shape[1:] >= seen_grid(views).shape[1:]
+
+
+def test_views_need_not_look_at_the_axis_along_their_middle_rays():
+    """A tomosynthesis: sources on an arc over a detector that stays where it is."""
+    angles, still = np.linspace(-0.3, 0.3, 9), np.ones((9, 1))
+    source = 100 * np.stack([np.sin(angles), -np.cos(angles), 0 * angles], axis=1)
+    for x, y in ((6.0, 40.0), (0.0, 10.0)):
+        rows, bins = still * [0, 0, 1], still * [1, 0, 0]
+        scan = rift.Vectors(source, still * [x, y, 0], bins, rows, 32, 64)
+        assert seen_grid(scan).center == pytest.approx((0, 0, 0), abs=1e-9)
+    # A helix about an axis that lies: few views see z, and no other upright line is seen by more.
+    turns, still = np.arange(36.0), np.ones((36, 1))
+    along = np.linspace(-60, 60, 36)
+    aside = np.stack([0 * turns, np.cos(turns), np.sin(turns)], axis=1)
+    source, middle = (away * aside + along[:, None] * [1, 0, 0] for away in (50, -50))
+    across, down = still * [1, 0, 0], np.cross(aside, [1, 0, 0])
+    assert seen_grid(rift.Vectors(source, middle, across, down, 16, 16)).shape[1] >= 16
+
+
 def test_a_fan_sees_a_slice():
     grid = seen_grid(CONE.fan())
     assert grid.shape == (16, 16) and grid.spacing == pytest.approx((0.4, 0.4))

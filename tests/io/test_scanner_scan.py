@@ -256,6 +256,22 @@ def vectors_of(cone: Cone) -> np.ndarray:
     return np.concatenate([v.source, v.middle, v.across, v.down], axis=1)
 
 
+def test_coarse_vectors_of_several_turns_have_a_unit_of_angles(tmp_path: Path) -> None:
+    """Their angles follow from places, whatever they span."""
+    steps = np.arange(60)
+    cone = Cone(steps * np.pi / 10, 6, 10, 0.5, 50, 100, heights=steps / 6 - 5)
+    np.savetxt(tmp_path / "vectors.txt", vectors_of(cone))
+    np.save(tmp_path / "scan.npy", np.ones((60, 6, 10), np.float32))
+    for unit in (None, "degrees"):
+        scan = open_scan(
+            tmp_path / "scan.npy",
+            geometry=tmp_path / "vectors.txt",
+            kind="attenuation",
+            angle_unit=unit,
+        )
+        np.testing.assert_allclose(scan.angles, cone.angles, atol=1e-9)
+
+
 @pytest.mark.parametrize("suffix", [".npy", ".geom", ".txt"])
 def test_astra_vectors(tmp_path: Path, suffix: str) -> None:
     cone = Cone(np.deg2rad(30.0 * np.arange(12)), 6, 10, (0.25, 0.2), 50, 200, (2, 4.2))

@@ -4,6 +4,7 @@ import json
 import subprocess
 import sys
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -68,7 +69,7 @@ def test_bad_arguments(ended, tmp_path, arguments, word):
     assert "Traceback" not in said
 
 
-@pytest.mark.parametrize("name", STUDIES)
+@pytest.mark.parametrize("name", [*STUDIES, pytest.param("radiance", marks=pytest.mark.study)])
 def test_every_study_yields_its_runs_and_shows_them(tool, tmp_path, name):
     plan = tool("bases.plan").Plan("tiny", tmp_path, (0,))
     study, device = tool(f"bases.{name}"), open_device()
@@ -119,6 +120,26 @@ def test_every_kind_of_radiance_splats_is_one_that_a_fit_takes(tool, tmp_path):
         found = radiance._settings(asked, kind, 30, 0, tmp_path, None)
         found.check()
         assert 1900 < found.training.splats * found.training.numbers <= 2000
+
+
+def test_a_fit_of_radiance_splats_is_recorded_with_its_steps(tool, tmp_path):
+    radiance = tool("bases.radiance")
+    kind = next(iter(radiance.KINDS))
+    settings = radiance._settings({"downscale": 4, "parameters": 2000}, kind, 30, 0, tmp_path, None)
+    scores = {"test": {"fit_psnr": 20.0, "fit_ssim": 0.5}}
+    fit = SimpleNamespace(settings=settings, metrics={"splats": 9, "scores": scores})
+    record = radiance._record(radiance._Running(kind, fit, wall=2.0, timed=10), 0)
+    assert record["taken"] == 30 and record["wall"] == pytest.approx(6.0)
+    assert record["parameters"] == 9 * settings.training.numbers
+
+
+def test_a_study_that_fails_leaves_the_report_of_the_others(tool, tmp_path, monkeypatch):
+    compare, fails = tool("compare_bases"), tool("bases.radiance")
+    monkeypatch.setattr(compare, "STUDIES", (fails,))
+    monkeypatch.setattr(fails, "compute", lambda *_: 1 / 0)
+    with pytest.raises(ZeroDivisionError):
+        compare._compare(compare.Settings(out=tmp_path, tiny=True))
+    assert (tmp_path / "report.html").exists()
 
 
 @pytest.fixture

@@ -147,15 +147,15 @@ def _settings(
 def _record(one: _Running, seed: int) -> dict[str, Any]:
     per_step = one.wall / max(1, one.timed)
     (scores,) = one.fit.metrics["scores"].values()
-    asked = one.fit.settings
+    training = one.fit.settings.training
     return {
         "basis": one.kind,
         "seed": seed,
-        "taken": asked.steps,
+        "taken": training.steps,
         "splats": one.fit.metrics["splats"],
-        "parameters": one.fit.metrics["splats"] * one.fit.training.numbers,
-        "per_splat": one.fit.training.numbers,
-        "wall": per_step * asked.steps,
+        "parameters": one.fit.metrics["splats"] * training.numbers,
+        "per_splat": training.numbers,
+        "wall": per_step * training.steps,
         "wall_ms": 1e3 * per_step,
         "cpu_ms": 1e3 * one.cpu / max(1, one.timed),
         "psnr": scores["fit_psnr"],

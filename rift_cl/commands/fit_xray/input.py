@@ -41,7 +41,7 @@ from rift_cl.commands.inputs.told_axis import (
 from rift_cl.errors import InputError
 from rift_cl.geometry import Camera, Cone, Grid, Parallel, Vectors
 from rift_cl.geometry.scan_cameras import ScanCameras, scan_cameras
-from rift_cl.geometry.seen_grid import scan_lengths, seen_grid
+from rift_cl.geometry.seen_grid import check_axis, scan_lengths, seen_grid
 from rift_cl.io.boundary import check_claim
 from rift_cl.io.images.display_light import LightKind
 from rift_cl.io.scans.scan_file import ScanFile
@@ -98,6 +98,9 @@ class XrayInput:
             )
         self.settings, self.device = settings, device
         self._refuse_for_cones(settings)
+        if isinstance(self.scan.cone, Vectors):
+            # Here, where lengths are the file's; those of the grid are bins.
+            check_axis(self.scan.cone)
         # What was found of the axis and has to be said of the rows, once they were read.
         self.notes: list[str] = []
         self.rows = chosen_rows(settings.rows, self.scan)

@@ -1,9 +1,9 @@
 """Plans for a scanner: what it has scanned stands for its source, its detector and its orbit.
 
 A view of a fan or a cone is a picture of a pinhole camera, so that further places of the source are
-planned as those of cameras are: as far from the target as before, the detector square to the ray
-through its middle. Azimuths are places on the orbit, elevations are tilts of the object (or of the
-gantry) against it.
+planned as those of cameras are: as far from the target as before, with the detector held to the
+ray through the target as it was. Azimuths are places on the orbit, elevations are tilts of the
+object (or of the gantry) against it.
 """
 
 from __future__ import annotations
@@ -21,13 +21,16 @@ from rift_cl.commands.inputs.view_set import Floats, ViewSet
 from rift_cl.commands.plan.settings import PlanSettings
 from rift_cl.errors import InputError
 from rift_cl.geometry import Camera, Cone, Vectors
-from rift_cl.geometry.seen_grid import scan_lengths
+from rift_cl.geometry.pose import look_at
+from rift_cl.geometry.seen_grid import seen_grid
 from rift_cl.io.captures.camera_file import CameraChoice
 from rift_cl.sampling.criteria.tuy import missed_planes
 from rift_cl.sampling.targets.prior import directions_for
 
 # Share of the target's outline on the detector: it stays as large as it is, whatever the target.
 COVER = 0.05
+# Tangent of the angle to z below which a view is along it.
+_ALONG = 1e-6
 # Points of the target at which planes are counted, and how far out they lie, as a share of the
 # radius.
 _POINTS, _OUT = 60, 0.7
@@ -89,20 +92,43 @@ def vectors_of(cameras: tuple[Camera, ...], orbit: Cone | Vectors) -> Vectors:
         cameras: the views.
         orbit: the scan that was taken, whose detector it is.
     """
-    lengths = scan_lengths(orbit)
+    taken = _vectors(orbit)
+    held = _detector(taken, _looked_at(taken, orbit))
     source = np.stack([camera.center for camera in cameras])
-    right, down, ahead = (
-        np.stack([camera.view[axis, :3] for camera in cameras]) for axis in range(3)
+    turns = np.stack([camera.view[:3, :3] for camera in cameras])
+    middle, across, down = (vector @ turns for vector in held)
+    return Vectors(source, source + middle, across, down, orbit.rows, orbit.bins)
+
+
+def _detector(taken: Vectors, aims: Floats) -> Floats:
+    """Where a scanner holds its detector, (3, 3): to its middle, from bin to bin, from row to row.
+
+    The medians over the views, in the coordinates (right, down, ahead) of an upright camera at the
+    source: a detector that stands aside, or is rolled in its plane, does so in all of them.
+
+    Args:
+        taken: the views.
+        aims: what these cameras look at, (views, 3).
+    """
+    vectors = np.stack([taken.middle - taken.source, taken.across, taken.down], axis=1)
+    ahead = aims - taken.source
+    along_z = np.hypot(ahead[:, 0], ahead[:, 1]) < _ALONG * np.abs(ahead[:, 2])
+    turns = np.stack(
+        [
+            look_at(source, aim, (0, 1, 0) if along else (0, 0, 1))[:3, :3]
+            for source, aim, along in zip(taken.source, aims, along_z, strict=True)
+        ]
     )
-    return Vectors(
-        source,
-        source + lengths.source_to_detector * ahead,
-        lengths.pitch[1] * right,
-        # Rows grow along z, those of pictures downwards.
-        -lengths.pitch[0] * down,
-        orbit.rows,
-        orbit.bins,
-    )
+    return np.asarray(np.median(vectors @ turns.transpose(0, 2, 1), axis=0))
+
+
+def _looked_at(taken: Vectors, orbit: Cone | Vectors) -> Floats:
+    """What each view looks at, (views, 3): the middle of the volume; of a helix, as it rises."""
+    aims = np.zeros_like(taken.source)
+    aims[:, 2] = seen_grid(orbit).center[0]
+    if isinstance(orbit, Cone):
+        aims[:, 2] += orbit.heights - (orbit.heights.min() + orbit.heights.max()) / 2
+    return aims
 
 
 def vectors_text(views: Vectors) -> str:
@@ -113,12 +139,16 @@ def vectors_text(views: Vectors) -> str:
 
 def joined(orbit: Cone | Vectors, more: Vectors) -> Vectors:
     """The views that were taken, and those that are planned."""
-    taken = orbit.vectors() if isinstance(orbit, Cone) else orbit
+    taken = _vectors(orbit)
     source, middle, across, down = (
         np.concatenate([getattr(taken, name), getattr(more, name)])
         for name in ("source", "middle", "across", "down")
     )
     return Vectors(source, middle, across, down, taken.rows, taken.bins)
+
+
+def _vectors(orbit: Cone | Vectors) -> Vectors:
+    return orbit.vectors() if isinstance(orbit, Cone) else orbit
 
 
 def missed_share(orbit: Cone | Vectors, have: ViewSet) -> float:

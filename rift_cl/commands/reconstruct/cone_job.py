@@ -43,7 +43,7 @@ from rift_cl.commands.reconstruct.report import (
     voxel,
 )
 from rift_cl.commands.reconstruct.settings import ReconstructSettings
-from rift_cl.commands.reconstruct.spread import begun_workers, spread
+from rift_cl.commands.reconstruct.spread import Receipt, begun_workers, spread
 from rift_cl.commands.reconstruct.volume import (
     chosen_window,
     clipped_words,
@@ -89,10 +89,12 @@ class ConeInversion:
     Args:
         window: where the volume lies.
         residuals: root mean square of the residual after each step, under one number.
+        weights: none: a volume that is solved for is made by one process.
     """
 
     window: VolumeWindow
     residuals: dict[int, list[float]] = dataclasses.field(default_factory=dict)
+    weights: dict[int, float] = dataclasses.field(default_factory=dict)
 
 
 class ConeReconstruction:
@@ -380,13 +382,12 @@ class ConeReconstruction:
         """Where it stands after so many slices."""
         return Report(done, self.shape[0], "slices", values or {})
 
-    def take(
-        self, figures: Mapping[str, int], zingers: int, residuals: Mapping[int, list[float]]
-    ) -> None:
+    def take(self, receipt: Receipt) -> None:
         """Take what a worker tells of the slices that it made."""
-        self._count(**figures)
-        self.source.clean.zingers += zingers
-        self.inversion.residuals.update(residuals)
+        self._count(**receipt.figures)
+        self.source.clean.zingers += receipt.zingers
+        self.inversion.residuals.update(receipt.residuals)
+        self.inversion.weights.update(receipt.weights)
 
     def _mended(self, integrals: Attenuation) -> None:
         """Count what was filled in rows that were read, and name those that are dead."""

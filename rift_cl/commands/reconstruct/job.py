@@ -41,7 +41,7 @@ from rift_cl.commands.reconstruct.report import (
 )
 from rift_cl.commands.reconstruct.settings import ReconstructSettings
 from rift_cl.commands.reconstruct.slice_input import SliceInput
-from rift_cl.commands.reconstruct.spread import begun_workers, spread
+from rift_cl.commands.reconstruct.spread import Receipt, begun_workers, spread
 from rift_cl.commands.reconstruct.volume import (
     check_place,
     chosen_window,
@@ -367,13 +367,12 @@ class Reconstruction:
                 return slices
             yield Report(done + report.done, self._total, self._what, report.values)
 
-    def take(
-        self, figures: Mapping[str, int], zingers: int, residuals: Mapping[int, list[float]]
-    ) -> None:
+    def take(self, receipt: Receipt) -> None:
         """Take what a worker tells of the slices that it made."""
-        self._count(**figures)
-        self.source.clean.zingers += zingers
-        self.inversion.residuals.update(residuals)
+        self._count(**receipt.figures)
+        self.source.clean.zingers += receipt.zingers
+        self.inversion.residuals.update(receipt.residuals)
+        self.inversion.weights.update(receipt.weights)
 
     def _mended(self, integrals: Attenuation) -> None:
         """Count what was filled in rows that were read, and name those that are dead."""

@@ -45,12 +45,14 @@ class Receipt(NamedTuple):
         figures: numbers that are added up over a run, by name.
         zingers: values that were replaced.
         residuals: root mean square of the residual after each step, by detector row.
+        weights: of the total variation, by detector row.
         device: what it was done on.
     """
 
     figures: dict[str, int]
     zingers: int
     residuals: dict[int, list[float]]
+    weights: dict[int, float]
     device: str
 
 
@@ -95,7 +97,7 @@ def spread(job: Run, begun: Beside[Workers], assembly: Assembly) -> Iterator[Rep
         for come in workers.each(make_slices, tasks):
             if come is not None:
                 used.add(come[1].device)
-                job.take(*come[1][:3])
+                job.take(come[1])
             if workers.lost > lost:
                 lost = workers.lost
                 job.announce("a worker was lost: its slices go to another")
@@ -181,11 +183,12 @@ def make_slices(
     job = _joined(settings, names, run)
     job.metrics, job.source.clean.zingers = {}, 0
     job.inversion.residuals.clear()
+    job.inversion.weights.clear()
     for _ in job.work_on([slice(first, stop)], job.kept.save):
         pass
     device = f"{job.device.name} ({job.device.platform} {job.device.driver})"
-    residuals = dict(job.inversion.residuals)
-    return Receipt(dict(job.metrics), job.source.clean.zingers, residuals, device)
+    residuals, weights = dict(job.inversion.residuals), dict(job.inversion.weights)
+    return Receipt(dict(job.metrics), job.source.clean.zingers, residuals, weights, device)
 
 
 @lru_cache(maxsize=1)

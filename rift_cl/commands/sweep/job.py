@@ -145,6 +145,17 @@ class Sweep:
                 done += 1
                 yield self._report(done)
 
+    @property
+    def refusal(self) -> str:
+        """A sentence about the runs that could not be done; empty where all were."""
+        if not self._refused:
+            return ""
+        name, why = next(iter(self._refused.items()))
+        return (
+            f"{len(self._refused)} of {len(self.runs)} runs could not be done: sweep.csv has why. "
+            f"The first is {name}: {why}"
+        )
+
     def _refuse(self, each: Variation, why: str) -> None:
         self._refused[each.name] = why
         self.announce(f"run {each.name}: {why}")

@@ -143,11 +143,11 @@ def sweep_page(job: str, rows: Sequence[Row]) -> Page:
             alt="Pictures of the runs",
         )
     page.section("Figures")
-    page.table(*score_table(rows), caption="sweep.csv has all figures")
-    refused = [(row.run.name, row.refused) for row in rows if row.refused]
-    if refused:
-        page.section("Runs that could not be done")
-        page.table(("run", "why"), refused)
+    columns, body = score_table(rows)
+    if any(row.refused for row in rows):
+        columns = [*columns, "why it could not be done"]
+        body = [[*cells, row.refused] for cells, row in zip(body, rows, strict=True)]
+    page.table(columns, body, caption="sweep.csv has all figures")
     page.section("Reports")
     for row in rows:
         if not row.refused:

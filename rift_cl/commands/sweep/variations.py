@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import re
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -63,7 +64,7 @@ def variations(sweep: SweepSettings) -> list[Variation]:
         count *= len(several_values)
     if count > _MOST_RUNS:
         raise InputError(f"--vary makes {count} runs, wanted {_MOST_RUNS} at most")
-    several = len(inputs) > 1
+    called = _input_names(sweep.inputs) if len(inputs) > 1 else {}
     runs = []
     for path, values in itertools.product(inputs, itertools.product(*varied.values())):
         texts = dict(zip(varied, values, strict=True))
@@ -71,7 +72,7 @@ def variations(sweep: SweepSettings) -> list[Variation]:
             name: _value(name, text, job, kind, earlier)
             for name, text in {**fixed, **texts}.items()
         }
-        shown = {"input": _input_name(path), **texts} if several and path is not None else texts
+        shown = {"input": called[path], **texts} if path in called else texts
         name = _folder_name(shown) or "run"
         given |= {} if path is None else {_INPUT[job]: str(path)}
         given |= {"out": str(sweep.out / "runs" / name)}
@@ -156,8 +157,23 @@ def _plain(word: str) -> Any:
     return value if isinstance(value, (bool, int, float)) else word
 
 
-def _input_name(path: Path) -> str:
-    return path.stem or path.name
+def _input_names(paths: Sequence[Path]) -> dict[Path, str]:
+    """Names of inputs that tell them apart: with as many folders before them as it takes."""
+    whole = {path: path.absolute() for path in paths}
+    beside = Counter(path.with_suffix("") for path in whole.values())
+    # The ending tells files of one folder apart.
+    last = {
+        path: path.name if beside[place.with_suffix("")] > 1 or not path.stem else path.stem
+        for path, place in whole.items()
+    }
+    names = dict(last)
+    for folders in range(1, max(len(place.parts) for place in whole.values())):
+        alike = Counter(names.values())
+        if len(alike) == len(names):
+            break
+        for path in (path for path, name in names.items() if alike[name] > 1):
+            names[path] = "/".join([*whole[path].parts[1:-1][-folders:], last[path]])
+    return names
 
 
 def _folder_name(varied: dict[str, str]) -> str:

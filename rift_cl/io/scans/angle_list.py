@@ -52,6 +52,7 @@ class AngleList:
         endpoint: whether the end of such a turn is one of them.
         unit: their unit where a file states it, or None.
         usual: their unit by the layout of their file.
+        computed: whether they follow from other numbers, so that ``unit`` is beyond doubt.
     """
 
     name: str
@@ -60,6 +61,7 @@ class AngleList:
     endpoint: bool = False
     unit: AngleUnit | None = None
     usual: AngleUnit = "degrees"
+    computed: bool = False
 
     @property
     def count(self) -> int | None:
@@ -103,9 +105,11 @@ class AngleList:
         return radians, phrase, ()
 
     def _unit(self, path: Path, asked: AngleUnit | None) -> tuple[AngleUnit, tuple[str, ...]]:
+        stated = self.unit or self.usual
+        if self.computed:
+            return stated, ()
         if asked is not None:
             return asked, ()
-        stated = self.unit or self.usual
         other: AngleUnit = "radians" if stated == "degrees" else "degrees"
         span = float(np.ptp(self.values))
         if not _doubtful(self.values, stated):

@@ -202,7 +202,7 @@ class ViewVectors:
     def angles(self) -> AngleList:
         """The directions that the sources stand in."""
         x, y = self.source[:, 0], self.source[:, 1]
-        return AngleList("sources", np.unwrap(np.arctan2(x, -y)), unit="radians")
+        return AngleList("sources", np.unwrap(np.arctan2(x, -y)), unit="radians", computed=True)
 
     def over(self, path: Path, shape: tuple[int, int, int], angles: Floats) -> Geometry:
         """The geometry of projections: a cone's where the views are on one circle.

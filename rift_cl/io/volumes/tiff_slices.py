@@ -17,12 +17,16 @@ from numpy.typing import NDArray
 from rift_cl.errors import FileFormatError, OutputError, ShapeError
 from rift_cl.io.boundary import check_claim, reading
 from rift_cl.io.output import atomic_path, staged_folder
+from rift_cl.io.scans.tiff_folder import tiff_names
 from rift_cl.io.volumes.imagej import description, resolution
 from rift_cl.io.volumes.layout import Floats, VolumeLayout, WriteSlab
 from rift_cl.io.volumes.plain_tiff import plain_pages
 from rift_cl.io.volumes.sample_window import restored
 
 _SLICE = re.compile(r"slice_(\d{5,})\.tif")
+_NUMBERED = re.compile(r"(.*?)(\d+)\.tiff?", re.IGNORECASE)
+# Names that an error shows.
+_LISTED = 4
 
 
 @contextmanager
@@ -36,16 +40,14 @@ def staged_volume(path: Path, layout: VolumeLayout) -> Iterator[WriteSlab]:
 
 def load_volume(path: Path, *, budget: int | None) -> Floats:
     """Read every slice of a folder."""
-    names = sorted(entry.name for entry in path.iterdir() if _SLICE.fullmatch(entry.name))
-    count = len(names)
-    missing = next((i for i in range(count) if not _slice(path, i).is_file()), None)
-    if missing is not None:
-        raise FileFormatError(f"{path}: slice {missing} of {count} is missing")
+    places = _slices(path)
+    count = len(places)
     volume = np.empty((0, 0, 0), np.float32)
-    for index in range(count):
-        place = _slice(path, index)
+    for index, place in enumerate(places):
         with reading(place, "the slice"):
             page = plain_pages(place)
+            if len(page.places) > 1:
+                raise ShapeError(f"{place}: has {len(page.places)} pages, wanted one slice")
             if index == 0:
                 check_claim(path, "the volume", (4 * count + 8) * math.prod(page.shape), budget)
                 volume = np.empty((count, *page.shape), np.float32)
@@ -53,8 +55,30 @@ def load_volume(path: Path, *, budget: int | None) -> Floats:
                 raise ShapeError(
                     f"{place}: has shape {page.shape}, the first slice {volume.shape[1:]}"
                 )
-            volume[index] = restored(page.samples(1), page.step, page.offset)[0]
+            volume[index] = restored(page.samples(), page.step, page.offset)[0]
     return volume
+
+
+def _slices(folder: Path) -> list[Path]:
+    """The slices of a folder in the order of their numbers, which other programs begin anywhere.
+
+    Raises:
+        FileFormatError: names have no number or different beginnings, or a number is missing.
+    """
+    names = tiff_names(folder)
+    ours = [name for name in names if _SLICE.fullmatch(name)]
+    found = [match for name in ours or names if (match := _NUMBERED.fullmatch(name))]
+    if not ours and (len(found) < len(names) or len({match[1] for match in found}) > 1):
+        raise FileFormatError(
+            f"{folder}: wanted one series of numbered slices, such as slice_00000.tif, and finds "
+            f"{', '.join(names[:_LISTED])}{', ...' if len(names) > _LISTED else ''}"
+        )
+    numbered = {int(match[2]): match[0] for match in found}
+    first = 0 if ours else min(numbered)
+    for index, number in enumerate(range(first, first + len(found))):
+        if number not in numbered:
+            raise FileFormatError(f"{folder}: slice {index} of {len(found)} is missing")
+    return [folder / numbered[number] for number in sorted(numbered)]
 
 
 def _slice(folder: Path, index: int) -> Path:

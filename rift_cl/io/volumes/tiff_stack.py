@@ -15,7 +15,6 @@ from typing import Any
 
 import tifffile
 
-from rift_cl.errors import FileFormatError
 from rift_cl.io.boundary import check_claim
 from rift_cl.io.volumes.imagej import description, resolution
 from rift_cl.io.volumes.layout import Floats, VolumeLayout, WriteSlab
@@ -39,13 +38,11 @@ def staged_volume(path: Path, layout: VolumeLayout) -> Iterator[WriteSlab]:
 
 
 def load_volume(path: Path, *, budget: int | None) -> Floats:
-    """Read every page of a stack that ``staged_volume`` wrote, or ImageJ."""
+    """Read every page of a stack that ``staged_volume`` wrote, ImageJ or another program."""
     pages = plain_pages(path)
-    if pages.slices < 1:
-        raise FileFormatError(f"{path}: names {pages.slices} slices, wanted 1 or more")
-    size = pages.slices * math.prod(pages.shape)
+    size = len(pages.places) * math.prod(pages.shape)
     check_claim(path, "the volume", size * (4 + pages.dtype.itemsize), budget)
-    return restored(pages.samples(pages.slices), pages.step, pages.offset)
+    return restored(pages.samples(), pages.step, pages.offset)
 
 
 def _write_header(layout: VolumeLayout, part: Path) -> int:

@@ -30,11 +30,15 @@ from rift_cl.errors import (
 from rift_cl.geometry import Grid
 from rift_cl.geometry.numbers import real_numbers
 from rift_cl.io.boundary import reading
+from rift_cl.io.npy_file import SIGNATURE
 from rift_cl.io.output import check_space, leftovers
+from rift_cl.io.scans.tiff_folder import tiff_names
 from rift_cl.io.volumes.layout import Floats, VolumeLayout, VolumePlace, WriteSlab
 from rift_cl.io.volumes.sample_window import SampleWindow
 
 Format = Literal["tiff", "tiff-stack", "zarr", "h5", "mrc"]
+# What is read besides.
+Readable = Format | Literal["npy"]
 SampleType = Literal["float32", "uint16", "uint8"]
 
 # What a volume is usually called, by format.
@@ -52,6 +56,7 @@ _MODULES = {
     "zarr": "ome_zarr",
     "h5": "hdf5",
     "mrc": "mrc",
+    "npy": "npy",
 }
 _HEADER_ROOM = 1 << 16
 _SLICE_ROOM = 1 << 12
@@ -115,8 +120,8 @@ def open_volume(
         OutputError: the disk has too little room.
     """
     path = Path(path)
-    if format not in _MODULES:
-        raise InputError(f"{path}: format is {format!r}, wanted one of {', '.join(_MODULES)}")
+    if format not in VOLUME_NAMES:
+        raise InputError(f"{path}: format is {format!r}, wanted one of {', '.join(VOLUME_NAMES)}")
     grid = Grid(shape, spacing)
     if len(grid.shape) != 3:
         raise ShapeError(f"{path}: shape is {grid.shape}, a volume has (z, y, x)")
@@ -139,7 +144,8 @@ def open_volume(
 def read_volume(path: str | os.PathLike[str], *, budget: int | None = None) -> Floats:
     """Read a whole volume (z, y, x), float32, that ``open_volume`` wrote in any of its formats.
 
-    Integers are turned back into the values that they stand for.
+    Also NumPy's .npy, TIFF files of plain pages and folders of numbered TIFF slices of other
+    programs. Integers are turned back into the values that they stand for.
 
     Args:
         path: the folder, store or file.
@@ -282,11 +288,11 @@ def _window(
     return SampleWindow(dtype, float(ends[0]), float(ends[1]))
 
 
-def _format_of(path: Path) -> Format:
+def _format_of(path: Path) -> Readable:
     if path.is_dir():
         if any((path / name).is_file() for name in ("zarr.json", ".zgroup", ".zarray")):
             return "zarr"
-        if (path / "slice_00000.tif").is_file():
+        if tiff_names(path):
             return "tiff"
         raise FileFormatError(
             f"{path}: holds neither slices (slice_00000.tif, ...) nor a Zarr array"
@@ -295,10 +301,21 @@ def _format_of(path: Path) -> Format:
         start = file.read(_MRC_MARK[0] + len(_MRC_MARK[1]))
     if start[:2] in (b"II", b"MM"):
         return "tiff-stack"
-    return "mrc" if start[_MRC_MARK[0] :] == _MRC_MARK[1] else "h5"
+    if start.startswith(SIGNATURE):
+        return "npy"
+    if start[_MRC_MARK[0] :] == _MRC_MARK[1]:
+        return "mrc"
+    import h5py
+
+    if h5py.is_hdf5(path):
+        return "h5"
+    raise FileFormatError(
+        f"{path}: is no volume, or a damaged one: wanted TIFF, HDF5, MRC or .npy, or a folder of "
+        "TIFF slices or a Zarr store"
+    )
 
 
-def _module(format: Format) -> _Format:
+def _module(format: Readable) -> _Format:
     return cast(_Format, importlib.import_module(f"{__package__}.{_MODULES[format]}"))
 
 
