@@ -50,6 +50,31 @@ def test_photographs_without_a_pose_and_other_models_are_counted(tmp_path: Path)
     assert open_capture(tmp_path, photographs=False).notes == ()
 
 
+def test_a_model_beside_a_transforms_json_is_told_and_can_be_named(tmp_path: Path) -> None:
+    path = made.transforms(tmp_path)
+    model = made.colmap_binary(tmp_path / "sparse" / "0")
+    found = note(tmp_path)
+    assert found.startswith("transforms.json is taken") and str(model) in found
+    assert open_capture(tmp_path).points is None
+    named = open_capture(model)
+    assert named.points is not None and named.notes == ()
+    # Whoever names the file has chosen.
+    assert open_capture(path).notes == ()
+
+
+def test_a_text_model_that_contradicts_the_binary_one_is_told(tmp_path: Path) -> None:
+    made.photographs(tmp_path / "images")
+    model = made.colmap_text(made.colmap_binary(tmp_path / "sparse"))
+    assert open_capture(tmp_path).notes == ()
+    lines = (model / "images.txt").read_text().splitlines()
+    (model / "images.txt").write_text("\n".join([*lines[:2], *lines[4:]]))
+    assert note(tmp_path).startswith(f"{model} holds two models that differ")
+    made.colmap_text(model, ("PINHOLE", [21.0, *made.PINHOLE[1][1:]]))
+    assert note(tmp_path).startswith(f"{model} holds two models that differ")
+    (model / "images.txt").write_text("1 2 3")
+    assert open_capture(tmp_path).notes == ()
+
+
 def test_a_damaged_model_that_is_not_asked_for_does_not_matter(tmp_path: Path) -> None:
     (two_models(tmp_path) / "sparse" / "1" / "images.txt").write_text("1 2 3")
     assert note(tmp_path).endswith("have a pose")

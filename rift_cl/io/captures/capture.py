@@ -74,8 +74,9 @@ def open_capture(
         file = _transforms(path)
         if file is not None and images is None:
             capture = open_transforms(file, photographs=photographs)
-            if file != path and file.name == _TRANSFORMS[1]:
-                capture = replace(capture, notes=(*capture.notes, *part_notes(file)))
+            if file != path:
+                notes = part_notes(file) if file.name == _TRANSFORMS[1] else []
+                capture = replace(capture, notes=(*capture.notes, *notes, *_model_notes(file)))
             return _told(capture, photographs)
         model = find_model(path)
     if model is not None:
@@ -96,6 +97,18 @@ def open_capture(
         f"and images, .bin or .txt, of a COLMAP model in {', '.join(MODEL_FOLDERS)}"
         f"{hint if bare else ''}{''.join(f'; {note}' for note in other_cameras(path))}"
     )
+
+
+def _model_notes(file: Path) -> list[str]:
+    """That a COLMAP model lies beside the transforms.json that was taken of a folder."""
+    model = find_model(file.parent)
+    if model is None:
+        return []
+    way = "move that file away" if model[0].samefile(file.parent) else "name its folder"
+    return [
+        f"{file.name} is taken of {file.parent}, and the COLMAP model in {model[0]} is left alone, "
+        f"its sparse points too: {way} to use it instead"
+    ]
 
 
 def _told(capture: Capture, photographs: bool) -> Capture:
