@@ -12,7 +12,7 @@ import pytest
 from PIL import Image, ImageCms
 from view_files import store
 
-from rift_cl.io import open_capture
+from rift_cl.io import open_capture, write_png
 from rift_cl.io.captures.capture_notes import range_notes
 from rift_cl.io.images.read_picture import read_picture_header
 
@@ -73,6 +73,23 @@ def test_a_text_model_that_contradicts_the_binary_one_is_told(tmp_path: Path) ->
     assert note(tmp_path).startswith(f"{model} holds two models that differ")
     (model / "images.txt").write_text("1 2 3")
     assert open_capture(tmp_path).notes == ()
+
+
+def test_the_share_of_a_wide_fisheye_that_is_used_is_told(tmp_path: Path) -> None:
+    """Of an equidistant fisheye of 180 degrees, counted by its own pixels."""
+    lens = {"camera_model": "OPENCV_FISHEYE", "fl_x": 30, "fl_y": 30, "cx": 48, "cy": 48}
+    path = made.transforms(tmp_path, **lens, w=96, h=96)
+    for name in made.NAMES:
+        write_png(tmp_path / "images" / name, np.zeros((96, 96, 3), np.uint8))
+    x, y = np.meshgrid(*2 * [np.arange(96) - 47.5])
+    radius = np.hypot(x, y)
+    reach = np.tan(np.minimum(radius / 30, 1.57)) * 30 / radius
+    share = np.mean((np.abs(x * reach) < 48) & (np.abs(y * reach) < 48))
+    found = note(path)
+    told = int(found.split(" % of the pixels")[0].split()[-1])
+    assert found.startswith("3 of 3 photographs lose") and abs(told - 100 * share) <= 1
+    path.write_text(json.dumps(json.loads(path.read_text()) | {"fisheye_crop_radius": 30}))
+    assert not any("lose" in note for note in open_capture(path).notes)
 
 
 def test_a_damaged_model_that_is_not_asked_for_does_not_matter(tmp_path: Path) -> None:

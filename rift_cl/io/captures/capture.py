@@ -8,7 +8,7 @@ from pathlib import Path
 
 from rift_cl.errors import InputError
 from rift_cl.io.boundary import reading
-from rift_cl.io.captures.capture_notes import color_notes, part_notes
+from rift_cl.io.captures.capture_notes import color_notes, lens_notes, part_notes
 from rift_cl.io.captures.colmap_model import MODEL_FOLDERS, find_model, open_model
 from rift_cl.io.captures.other_cameras import other_cameras, other_program, way_out
 from rift_cl.io.captures.photograph_folder import (
@@ -112,10 +112,11 @@ def _model_notes(file: Path) -> list[str]:
 
 
 def _told(capture: Capture, photographs: bool) -> Capture:
-    """With what is to be said of the photographs' colours, if they are there."""
+    """With what is to be said of the photographs' colours and lenses, if they are there."""
     if not photographs:
         return capture
-    return replace(capture, notes=(*capture.notes, *color_notes(capture.views)))
+    more = *lens_notes(capture.views), *color_notes(capture.views)
+    return replace(capture, notes=(*capture.notes, *more))
 
 
 def capture_name(path: Path) -> str:
