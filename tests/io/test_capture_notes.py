@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import json
+import struct
 import zlib
 from pathlib import Path
 
 import capture_files as made
 import numpy as np
+import OpenImageIO
 import pytest
 from PIL import Image, ImageCms
 from view_files import store
@@ -231,6 +233,54 @@ def test_the_gamma_of_a_png(
 ) -> None:
     header = read_picture_header(with_chunk(tmp_path / "a.png", kind, content))
     assert (header.linear, header.profile, header.floating) == (linear, profile, False)
+
+
+SRGB = (0.3127, 0.329, 0.64, 0.33, 0.3, 0.6, 0.15, 0.06)
+ADOBE = (*SRGB[:4], 0.21, 0.71, *SRGB[6:])
+
+
+@pytest.mark.parametrize(
+    ("white_first", "profile"),
+    [(SRGB, ""), (ADOBE, "primaries of Adobe RGB"), ((*SRGB[:7], 0.2), "(0.15, 0.2)")],
+)
+def test_the_primaries_of_a_png(
+    tmp_path: Path, white_first: tuple[float, ...], profile: str
+) -> None:
+    content = struct.pack(">8I", *(round(1e5 * value) for value in white_first))
+    found = read_picture_header(with_chunk(tmp_path / "a.png", b"cHRM", content)).profile
+    assert profile in found and bool(profile) == bool(found)
+    overridden = with_chunk(tmp_path / "a.png", b"cHRM", content).read_bytes()
+    start, rest = overridden[:33], overridden[33:]
+    srgb = b"sRGB\0"
+    chunk = b"\0\0\0\1" + srgb + zlib.crc32(srgb).to_bytes(4, "big")
+    (tmp_path / "a.png").write_bytes(start + chunk + rest)
+    assert read_picture_header(tmp_path / "a.png").profile == ""
+
+
+def test_the_primaries_of_openexr_are_told(tmp_path: Path) -> None:
+    path = stored(tmp_path, "exr", "half", 0.5)
+    pixels = np.full((made.HEIGHT, made.WIDTH, 3), 0.5, np.float32)
+    cg = (0.713, 0.293, 0.165, 0.83, 0.128, 0.044, 0.32168, 0.33767)
+    for primaries, words in ((cg, "primaries of ACEScg"), ((*SRGB[2:], *SRGB[:2]), None)):
+        spec = OpenImageIO.ImageSpec(made.WIDTH, made.HEIGHT, 3, "half")
+        spec.attribute("chromaticities", "float[8]", primaries)
+        output = OpenImageIO.ImageOutput.create("a.exr")
+        assert output.open(str(tmp_path / "images" / "a.exr"), spec)
+        assert output.write_image(pixels) and output.close()
+        notes = open_capture(path).notes
+        assert len(notes) == (words is not None)
+        assert words is None or (words in notes[0] and "linear sRGB" in notes[0])
+
+
+def test_a_jpeg_that_is_not_srgb_by_its_exif_is_told(tmp_path: Path) -> None:
+    """As cameras mark Adobe RGB, which they add no profile to."""
+    codes = Image.new("RGB", (made.WIDTH, made.HEIGHT))
+    exif = Image.Exif()
+    for value, told in ((1, ""), (65535, "Adobe RGB")):
+        exif.get_ifd(0x8769)[0xA001] = value
+        codes.save(tmp_path / "a.jpg", exif=exif)
+        found = read_picture_header(tmp_path / "a.jpg").profile
+        assert told in found and bool(told) == bool(found)
 
 
 def test_codes_that_are_linear_light_are_told_of(tmp_path: Path) -> None:

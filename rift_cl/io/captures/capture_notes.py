@@ -183,9 +183,10 @@ def _some(views: Sequence[View]) -> Sequence[View]:
 
 def _color_sentence(path: Path, header: PictureHeader) -> str:
     if header.profile:
+        taken = "linear sRGB" if header.linear else "sRGB"
         return (
             f"{path.name} has the colour profile {header.profile!r}, which is not applied: colours "
-            "are taken as sRGB"
+            f"are taken as {taken}"
         )
     if header.linear and not header.floating:
         return f"{path.name} says that its codes are linear light (gamma 1), and is read so"
