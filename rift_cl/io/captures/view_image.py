@@ -17,6 +17,7 @@ from rift_cl.errors import FileFormatError, InputError, NonFiniteError, ShapeErr
 from rift_cl.io.boundary import check_claim
 from rift_cl.io.captures.view import View, camera_at
 from rift_cl.io.images.display_light import LightKind, to_display, to_linear
+from rift_cl.io.images.image_format import SUFFIXES
 from rift_cl.io.images.picture_header import PictureHeader
 from rift_cl.io.images.read_picture import read_picture_header, read_pixels
 from rift_cl.io.images.resample import shrunk, undistorted
@@ -34,8 +35,8 @@ _SHOWN = {
     7: (-1, True),
     8: (1, False),
 }
-# Suffixes of formats that do not keep every code, and what is white in a mask of such.
-_LOSSY, _HALF = (".jpg", ".jpeg"), 0.5
+# The format that does not keep every code, and what is white in a mask of it.
+_LOSSY, _HALF = "jpeg", 0.5
 # The code 1 of 8 bits, with room for rounding.
 _ONE_CODE = 1.01 / 255
 
@@ -261,7 +262,7 @@ def _coverage(path: Path, budget: int | None) -> Image:
     mask: Image = colors.mean(axis=-1, dtype=np.float32)
     if header.alpha:
         mask = _with_own_alpha(path, mask, codes[..., -1])
-    if path.suffix.lower() in _LOSSY:
+    if SUFFIXES[path.suffix.lower()] == _LOSSY:
         # Black and white come back as greys wherever an edge is near.
         return (mask > _HALF).astype(np.float32)
     return np.clip(mask, 0, 1)
