@@ -121,6 +121,14 @@ def test_densities_of_xrays_are_no_splats_of_a_viewer(here, arrays, capsys):
     assert [entry.name for entry in here.iterdir()] == ["bone.ply"]
 
 
+def test_an_up_that_is_guessed_is_called_so(here, arrays, capsys):
+    SplatScene(**arrays).save(here / "ball.ply")
+    for given, guessed in (((), True), (("--up", 0, 0, 1), False)):
+        assert export("ball.ply", "--to", "glb", "--dry-run", *given) == 0
+        said = " ".join(capsys.readouterr().out.replace("│", " ").split())
+        assert "is turned so that up" in said and ("guessed from the splats" in said) == guessed
+
+
 def test_up_is_y_in_formats_that_say_so(here, arrays):
     SplatScene(**arrays).save(here / "ball.ply")
     assert export("ball.ply", "--to", "glb", "--up", 0, 0, 1, "--quiet") == 0

@@ -17,6 +17,7 @@ from test_video import store_video
 
 from rift_cl.cl.discovery import default_device
 from rift_cl.commands.cli import main
+from rift_cl.commands.fit_photos import bare_input
 from rift_cl.commands.fit_photos.job import Fit
 from rift_cl.commands.fit_photos.photograph_size import (
     MOST_PIXELS,
@@ -82,6 +83,22 @@ def test_what_is_odd_in_a_folder_is_said_in_two_lines(photographs, tmp_path, pos
     )
     assert said[3] == "rift: 1 of 3 photographs have a mask: black is left out"
     assert len(said) == 4
+
+
+def test_poses_of_another_program_are_told_before_they_are_found_anew(
+    photographs, tmp_path, posed, capsys, monkeypatch
+):
+    (photographs / "bundle.out").write_text("# Bundle file v0.3\n")
+    note = f"poses are found anew: {photographs / 'bundle.out'} holds cameras of Bundler, which"
+    assert note in Fit(FitPhotosSettings(capture=photographs, out=tmp_path / "fit")).plan()["notes"]
+
+    def fail(*_, **__):
+        raise InputError("no poses")
+        yield
+
+    monkeypatch.setattr(bare_input, "pose_photographs", fail)
+    assert main(["fit", str(photographs), "--out", str(tmp_path / "fit"), *SHORT]) == 3
+    assert note in capsys.readouterr().err
 
 
 def test_a_dry_run_counts_photographs_without_poses(photographs, tmp_path, posed, capsys):

@@ -11,6 +11,7 @@ from typing import Any
 import capture_files as made
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from rift_cl.errors import FileFormatError, InputError, NonFiniteError, RiftError
 from rift_cl.io import open_capture
@@ -165,10 +166,35 @@ def test_what_is_no_json_object(tmp_path: Path, content: bytes) -> None:
         open_capture(tmp_path)
 
 
+@pytest.mark.parametrize(("digits", "told"), [(6, False), (4, False), (3, True)])
+def test_poses_of_few_digits_are_read_and_told(tmp_path: Path, digits: int, told: bool) -> None:
+    path = made.transforms(tmp_path)
+    for index in range(3):
+        turned = Rotation.from_euler("xyz", [0.7, 0.3 + index, 0.9]).as_matrix()
+        pose = np.round(np.column_stack([turned, [1, 2, 3]]), digits)
+        made.changed(path, index, transform_matrix=[*pose.tolist(), [0, 0, 0, 1]])
+    capture = open_capture(path)
+    assert bool(capture.notes) == told
+    assert not told or "of 3 photographs have few digits" in capture.notes[0]
+    for view in capture.views:
+        rotation = view.camera.view[:3, :3]
+        np.testing.assert_allclose(rotation @ rotation.T, np.eye(3), atol=1e-9)
+
+
+def test_a_pose_of_two_digits_is_not_called_scaled(tmp_path: Path) -> None:
+    pose = np.round(made.opengl(1), 2).tolist()
+    path = made.changed(made.transforms(tmp_path), 1, transform_matrix=pose)
+    with pytest.raises(InputError, match="too few digits"):
+        open_capture(path)
+
+
 def test_a_camera_model_that_is_not_read_is_named(tmp_path: Path) -> None:
     for written in (made.colmap_text, made.colmap_binary):
         written(tmp_path / written.__name__, ("DIVISION", [20.0, 21.0, 6.5, 4.25, 0.1]))
-        with pytest.raises(FileFormatError, match=r"'DIVISION' is not known.*image_undistorter"):
+        words = r"camera 7: .*'DIVISION' is not known.*image_undistorter"
+        if written is made.colmap_text:
+            words = words.removeprefix("camera 7: .*")
+        with pytest.raises(FileFormatError, match=words):
             open_capture(tmp_path / written.__name__)
 
 

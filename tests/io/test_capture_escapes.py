@@ -83,8 +83,23 @@ def test_a_folder_of_images_that_lies_outside(capture: Path) -> None:
     made.colmap_text(capture / "sparse")
     (capture / "images").rename(capture.parent / "images")
     (capture / "images").symlink_to(capture.parent / "images")
-    with pytest.raises(PathEscapeError, match="outside the folder"):
+    with pytest.raises(PathEscapeError, match="outside the folder") as caught:
         open_capture(capture)
+    words = f"{capture / 'images'} is a link to {capture.parent / 'images'}, outside"
+    assert words in str(caught.value) and "cp -rL" in str(caught.value)
+
+
+def test_a_photograph_that_is_a_link_is_called_so(capture: Path) -> None:
+    """Whoever made it reads what to do; a name that leads out by itself is no link."""
+    path = capture / "transforms.json"
+    for name, words in (
+        ("link_to_link.png", f"{capture / 'link_to_link.png'} is a link to"),
+        ("link/secret.png", f"{capture / 'link'} is a link to {capture.parent}, outside"),
+        ("../secret.png", "leads to '../secret.png'"),
+    ):
+        with pytest.raises(PathEscapeError) as caught:
+            open_capture(made.changed(path, 1, file_path=name))
+        assert words in str(caught.value)
 
 
 def test_a_mask_that_lies_outside(capture: Path) -> None:

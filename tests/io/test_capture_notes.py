@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 import json
+import struct
 import zlib
 from pathlib import Path
 
 import capture_files as made
 import numpy as np
+import OpenImageIO
 import pytest
 from PIL import Image, ImageCms
 from view_files import store
 
-from rift_cl.io import open_capture
+from rift_cl.io import open_capture, write_png
 from rift_cl.io.captures.capture_notes import range_notes
 from rift_cl.io.images.read_picture import read_picture_header
 
@@ -48,6 +50,48 @@ def test_photographs_without_a_pose_and_other_models_are_counted(tmp_path: Path)
     # The folder of c.png has no photograph with a pose, and is not looked into.
     assert "1 of 3 photographs" in other and "sparse/0 has 3" in other
     assert open_capture(tmp_path, photographs=False).notes == ()
+
+
+def test_a_model_beside_a_transforms_json_is_told_and_can_be_named(tmp_path: Path) -> None:
+    path = made.transforms(tmp_path)
+    model = made.colmap_binary(tmp_path / "sparse" / "0")
+    found = note(tmp_path)
+    assert found.startswith("transforms.json is taken") and str(model) in found
+    assert open_capture(tmp_path).points is None
+    named = open_capture(model)
+    assert named.points is not None and named.notes == ()
+    # Whoever names the file has chosen.
+    assert open_capture(path).notes == ()
+
+
+def test_a_text_model_that_contradicts_the_binary_one_is_told(tmp_path: Path) -> None:
+    made.photographs(tmp_path / "images")
+    model = made.colmap_text(made.colmap_binary(tmp_path / "sparse"))
+    assert open_capture(tmp_path).notes == ()
+    lines = (model / "images.txt").read_text().splitlines()
+    (model / "images.txt").write_text("\n".join([*lines[:2], *lines[4:]]))
+    assert note(tmp_path).startswith(f"{model} holds two models that differ")
+    made.colmap_text(model, ("PINHOLE", [21.0, *made.PINHOLE[1][1:]]))
+    assert note(tmp_path).startswith(f"{model} holds two models that differ")
+    (model / "images.txt").write_text("1 2 3")
+    assert open_capture(tmp_path).notes == ()
+
+
+def test_the_share_of_a_wide_fisheye_that_is_used_is_told(tmp_path: Path) -> None:
+    """Of an equidistant fisheye of 180 degrees, counted by its own pixels."""
+    lens = {"camera_model": "OPENCV_FISHEYE", "fl_x": 30, "fl_y": 30, "cx": 48, "cy": 48}
+    path = made.transforms(tmp_path, **lens, w=96, h=96)
+    for name in made.NAMES:
+        write_png(tmp_path / "images" / name, np.zeros((96, 96, 3), np.uint8))
+    x, y = np.meshgrid(*2 * [np.arange(96) - 47.5])
+    radius = np.hypot(x, y)
+    reach = np.tan(np.minimum(radius / 30, 1.57)) * 30 / radius
+    share = np.mean((np.abs(x * reach) < 48) & (np.abs(y * reach) < 48))
+    found = note(path)
+    told = int(found.split(" % of the pixels")[0].split()[-1])
+    assert found.startswith("3 of 3 photographs lose") and abs(told - 100 * share) <= 1
+    path.write_text(json.dumps(json.loads(path.read_text()) | {"fisheye_crop_radius": 30}))
+    assert not any("lose" in note for note in open_capture(path).notes)
 
 
 def test_a_damaged_model_that_is_not_asked_for_does_not_matter(tmp_path: Path) -> None:
@@ -189,6 +233,54 @@ def test_the_gamma_of_a_png(
 ) -> None:
     header = read_picture_header(with_chunk(tmp_path / "a.png", kind, content))
     assert (header.linear, header.profile, header.floating) == (linear, profile, False)
+
+
+SRGB = (0.3127, 0.329, 0.64, 0.33, 0.3, 0.6, 0.15, 0.06)
+ADOBE = (*SRGB[:4], 0.21, 0.71, *SRGB[6:])
+
+
+@pytest.mark.parametrize(
+    ("white_first", "profile"),
+    [(SRGB, ""), (ADOBE, "primaries of Adobe RGB"), ((*SRGB[:7], 0.2), "(0.15, 0.2)")],
+)
+def test_the_primaries_of_a_png(
+    tmp_path: Path, white_first: tuple[float, ...], profile: str
+) -> None:
+    content = struct.pack(">8I", *(round(1e5 * value) for value in white_first))
+    found = read_picture_header(with_chunk(tmp_path / "a.png", b"cHRM", content)).profile
+    assert profile in found and bool(profile) == bool(found)
+    overridden = with_chunk(tmp_path / "a.png", b"cHRM", content).read_bytes()
+    start, rest = overridden[:33], overridden[33:]
+    srgb = b"sRGB\0"
+    chunk = b"\0\0\0\1" + srgb + zlib.crc32(srgb).to_bytes(4, "big")
+    (tmp_path / "a.png").write_bytes(start + chunk + rest)
+    assert read_picture_header(tmp_path / "a.png").profile == ""
+
+
+def test_the_primaries_of_openexr_are_told(tmp_path: Path) -> None:
+    path = stored(tmp_path, "exr", "half", 0.5)
+    pixels = np.full((made.HEIGHT, made.WIDTH, 3), 0.5, np.float32)
+    cg = (0.713, 0.293, 0.165, 0.83, 0.128, 0.044, 0.32168, 0.33767)
+    for primaries, words in ((cg, "primaries of ACEScg"), ((*SRGB[2:], *SRGB[:2]), None)):
+        spec = OpenImageIO.ImageSpec(made.WIDTH, made.HEIGHT, 3, "half")
+        spec.attribute("chromaticities", "float[8]", primaries)
+        output = OpenImageIO.ImageOutput.create("a.exr")
+        assert output.open(str(tmp_path / "images" / "a.exr"), spec)
+        assert output.write_image(pixels) and output.close()
+        notes = open_capture(path).notes
+        assert len(notes) == (words is not None)
+        assert words is None or (words in notes[0] and "linear sRGB" in notes[0])
+
+
+def test_a_jpeg_that_is_not_srgb_by_its_exif_is_told(tmp_path: Path) -> None:
+    """As cameras mark Adobe RGB, which they add no profile to."""
+    codes = Image.new("RGB", (made.WIDTH, made.HEIGHT))
+    exif = Image.Exif()
+    for value, told in ((1, ""), (65535, "Adobe RGB")):
+        exif.get_ifd(0x8769)[0xA001] = value
+        codes.save(tmp_path / "a.jpg", exif=exif)
+        found = read_picture_header(tmp_path / "a.jpg").profile
+        assert told in found and bool(told) == bool(found)
 
 
 def test_codes_that_are_linear_light_are_told_of(tmp_path: Path) -> None:

@@ -22,6 +22,7 @@ from rift_cl.errors import (
     ShapeError,
 )
 from rift_cl.io import read_image, write_png
+from rift_cl.io.captures.photograph_folder import photograph_names, photographs_in
 from rift_cl.io.images.pixels import write_pixels
 
 RANDOM = np.random.default_rng(3)
@@ -119,6 +120,26 @@ def test_other_formats_under_the_name_of_png(tmp_path: Path, format: str) -> Non
     path = store(tmp_path / "a", np.zeros((4, 4, 3), np.uint8), format, ".png")
     with pytest.raises(FileFormatError, match=r"name says \.png"):
         read_image(path)
+
+
+@pytest.mark.parametrize("suffix", [".jfif", ".jpe", ".JPEG"])
+def test_jpeg_has_other_names(tmp_path: Path, suffix: str) -> None:
+    pixels = np.full((4, 6, 3), 0.5, np.float32)
+    plain = view_files.store(tmp_path / "a.jpg", pixels, "uint8")
+    other = tmp_path / f"b{suffix}"
+    other.write_bytes(plain.read_bytes())
+    np.testing.assert_array_equal(read_image(other), read_image(plain))
+    assert photograph_names(photographs_in(tmp_path)) == ["a.jpg", other.name]
+
+
+def test_a_wrong_name_and_a_format_that_is_not_read_say_what_to_do(tmp_path: Path) -> None:
+    write_png(tmp_path / "a.png", np.zeros((4, 4, 3), np.uint8))
+    renamed = (tmp_path / "a.png").rename(tmp_path / "a.jpg")
+    with pytest.raises(FileFormatError, match=r"name says \.jpg: rename it to end in \.png"):
+        read_image(renamed)
+    (tmp_path / "b.webp").write_bytes(b"RIFF1234WEBPVP8 ")
+    with pytest.raises(FileFormatError, match=r"b\.webp: .*not read: convert it to PNG or JPEG"):
+        read_image(tmp_path / "b.webp")
 
 
 def test_png_under_another_name(tmp_path: Path) -> None:

@@ -13,8 +13,9 @@ from test_start import ring
 from rift_cl.errors import FileFormatError, InputError, PathEscapeError
 from rift_cl.geometry import Camera
 from rift_cl.geometry.aperture import Aperture
+from rift_cl.geometry.lens_distortion import Lens
 from rift_cl.io import open_capture, write_json
-from rift_cl.io.captures.transforms_record import transforms_of
+from rift_cl.io.captures.transforms_record import lens_fields, transforms_of
 
 NAMES = ["0.png", "deep/1.png", "2"]
 
@@ -53,6 +54,25 @@ def test_what_is_known_of_the_lens_is_in_the_file(tmp_path):
     assert not {"aperture_radius", "focus_distance", "wavelength"} & set(pinhole)
     views = open_capture(tmp_path, photographs=False).views
     assert [v.camera.aperture for v in views] == [lens, Aperture(0.1, np.inf), None]
+
+
+FISHEYE = Lens("OPENCV_FISHEYE", (0.1, 0, 0, 0), np.eye(3))
+RADIAL = Lens("RADIAL", (0.1, 0.02), np.eye(3))
+
+
+@pytest.mark.parametrize(
+    ("lenses", "top"),
+    [
+        ([FISHEYE, FISHEYE], "OPENCV_FISHEYE"),
+        ([RADIAL, None], "OPENCV"),
+        ([None, FISHEYE], None),
+    ],
+)
+def test_the_top_of_the_file_names_the_model_of_all_frames(tmp_path, lenses, top):
+    record = written(tmp_path, ring(2), [lens_fields(lens) for lens in lenses])
+    assert record.get("camera_model") == top
+    found = [view.lens for view in open_capture(tmp_path, photographs=False).views]
+    assert [lens and lens.model for lens in found] == [lens and lens.model for lens in lenses]
 
 
 def test_photographs_have_to_be_there_unless_the_caller_can_do_without(tmp_path):

@@ -106,9 +106,20 @@ def test_frames_are_taken_up_again_unless_the_video_or_the_number_changed(
         run(sharpest_frames(video, folder, 4))
 
 
-@pytest.mark.parametrize(("matrix", "corner"), [((0, 1, -1, 0), "right"), ((0, -1, 1, 0), "left")])
-def test_frames_are_turned_as_the_file_says(
-    video: Path, tmp_path: Path, matrix: tuple[int, ...], corner: str
+@pytest.mark.parametrize(
+    ("matrix", "down", "right"),
+    [
+        ((-1, 0, 0, 1), 0, 1),
+        ((0, 1, -1, 0), 0, 1),
+        ((0, -1, 1, 0), 1, 0),
+        ((-1, 0, 0, -1), 1, 1),
+        ((1, 0, 0, -1), 1, 0),
+        ((0, 1, 1, 0), 0, 0),
+        ((0, -1, -1, 0), 1, 1),
+    ],
+)
+def test_frames_are_turned_and_mirrored_as_the_file_says(
+    video: Path, tmp_path: Path, matrix: tuple[int, ...], down: int, right: int
 ) -> None:
     """QuickTime's matrix a b c d: x' = a x + c y, y' = b x + d y, down and to the right."""
     data = bytearray(video.read_bytes())
@@ -119,9 +130,17 @@ def test_frames_are_turned_as_the_file_says(
     video.write_bytes(data)
     run(sharpest_frames(video, tmp_path / "frames", 4))
     image = read_image(tmp_path / "frames" / "00001.jpg")
-    assert image.shape == (WIDTH, HEIGHT, 3)
-    white = image[:20, -12:] if corner == "right" else image[-20:, :12]
-    assert white.min() > 0.85
+    high, wide = (WIDTH, HEIGHT) if matrix[0] == 0 else (HEIGHT, WIDTH)
+    assert image.shape == (high, wide, 3)
+    # The white corner is 16 x 24 pixels as stored, and the only white.
+    corners = image[:: high - 1, :: wide - 1].min(axis=2)
+    assert corners[down, right] > 0.85
+    assert np.count_nonzero(corners > 0.85) == 1
+    # Turns and mirrors that leave the corner where it is differ in what is next to it.
+    white = image.min(axis=2) > 0.7
+    extent = (16, 24) if matrix[0] else (24, 16)
+    rows, columns = white.any(axis=1).sum(), white.any(axis=0).sum()
+    assert abs(rows - extent[0]) <= 2 and abs(columns - extent[1]) <= 2
 
 
 def test_files_without_frames_are_refused_in_a_sentence(video: Path, tmp_path: Path) -> None:

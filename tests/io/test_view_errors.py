@@ -51,6 +51,25 @@ def test_budget(tmp_path: Path) -> None:
         assert peak < need + (8 << 20)
 
 
+@pytest.mark.parametrize(
+    ("size", "words"),
+    [
+        ((72, 96), r"--downscale 2\).* by 0\.5$"),
+        ((71, 96), r"--downscale 2\).* by 0\.49"),
+        ((288, 384), r"same shape: multiply .* by 2$"),
+        ((72, 192), "crop"),
+    ],
+)
+def test_photographs_of_another_size_than_the_camera_s(
+    tmp_path: Path, size: tuple[int, int], words: str
+) -> None:
+    """Many captures come with photographs made smaller, under the intrinsics of large ones."""
+    write_png(tmp_path / "a.png", np.zeros((*size, 3), np.uint8))
+    view = View("a", Camera((144, 192), K, np.eye(4)), tmp_path / "a.png", None, None)
+    with pytest.raises(ShapeError, match=words):
+        read_view(view)
+
+
 def test_a_picture_that_claims_more_than_there_is(tmp_path: Path) -> None:
     write_png(tmp_path / "a.png", np.zeros((4, 4, 3), np.uint8))
     view = View("a", Camera((1 << 24, 1 << 24), K, np.eye(4)), tmp_path / "a.png", None, None)

@@ -67,12 +67,7 @@ class Export:
         self.turn = np.eye(3)
         if self.format.upright:
             self.turn = turn_between(self._bounds.up, _UP)
-            self.notes.append(
-                "the scene is turned so that up, ({:.3g}, {:.3g}, {:.3g}), is y".format(
-                    # Rounding leaves a little beside an axis; 0 is added against a minus sign.
-                    *(self._bounds.up.round(4) + 0.0)
-                )
-            )
+            self.notes.append(self._turn_note())
         if self.format.suffix == _PAGE and self.plain.degree:
             self.notes.append(
                 "the page draws each splat in one colour, the mean of what the cameras saw: what "
@@ -81,6 +76,18 @@ class Export:
             )
         self.notes += self.format.notes(self._written())
         self.notes += self._blur_notes()
+
+    def _turn_note(self) -> str:
+        """Which way was up, and how that is known."""
+        # Rounding leaves a little beside an axis; 0 is added against a minus sign.
+        x, y, z = self._bounds.up.round(4) + 0.0
+        note = f"the scene is turned so that up, ({x:.3g}, {y:.3g}, {z:.3g}), is y"
+        if self._bounds.cameras or self.settings.up is not None:
+            return note
+        return (
+            f"{note}; up is guessed from the splats, since no cameras tell: --up or "
+            "--capture says it"
+        )
 
     def _written(self) -> SplatScene:
         """The splats as the format is given them."""

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Literal
 
 from rift_cl.commands.run_folder.saved_settings import named_config
+from rift_cl.io.captures.other_cameras import other_program
 from rift_cl.io.scans.formats import is_scan_file
 from rift_cl.json_parsing import parse_json
 
@@ -26,7 +27,12 @@ def kind_of_fit(arguments: Sequence[str]) -> Literal["photos", "xray"]:
     # What follows an option may be its value, so that the others are looked at first.
     words = [word for word in arguments if not word.startswith("-")]
     given = [word for word in words if _free(word, arguments)] or words
-    return "xray" if any(is_scan_file(Path(word)) for word in given) else "photos"
+    return "xray" if any(_is_scan(Path(word)) for word in given) else "photos"
+
+
+def _is_scan(path: Path) -> bool:
+    """Whether a file is a scan, and not cameras that another program left in a file of its kind."""
+    return is_scan_file(path) and other_program(path) is None
 
 
 def _free(word: str, arguments: Sequence[str]) -> bool:

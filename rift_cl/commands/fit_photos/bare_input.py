@@ -11,6 +11,7 @@ from pathlib import Path
 
 from rift_cl.io.captures.capture import Capture, holds_bare_photographs, open_capture
 from rift_cl.io.captures.colmap_process import check_pycolmap
+from rift_cl.io.captures.other_cameras import other_cameras
 from rift_cl.io.captures.photograph_folder import (
     other_files,
     photograph_names,
@@ -44,7 +45,7 @@ class BareInput:
         self._video = holds_video(source)
         self.folder = out / "frames" if self._video else source
         self._posed = out / "poses"
-        # What was said of the input, a sentence each.
+        # What is to be said of the input, a sentence each; more once its poses are found.
         self.notes: list[str] = []
         self.photographs = 0
         if self._video:
@@ -53,6 +54,8 @@ class BareInput:
                 check_pycolmap()
         elif not self._posed.exists():
             check_photographs(source)
+        if not self._video:
+            self.notes += _left_alone(source)
 
     @staticmethod
     def fits(source: Path) -> bool:
@@ -87,8 +90,6 @@ class BareInput:
             taken, total = yield from sharpest_frames(self.source, self.folder, self._frames)
             self.notes.append(f"{taken} of the video's {total} frames are taken, the sharpest")
             self.notes += video_notes(self.source)
-        else:
-            self.notes += _left_alone(self.folder)
         found = yield from pose_photographs(self.folder, self._posed, seed=self._seed)
         self.photographs = len(found.placed) + len(found.missing)
         if found.missing:
@@ -99,8 +100,9 @@ class BareInput:
 
 
 def _left_alone(folder: Path) -> list[str]:
-    """Which files of a folder are not used: photographs that are not read, and other files."""
-    notes, place = [], photographs_in(folder)
+    """What of a folder is not used: poses and photographs that are not read, and other files."""
+    place = photographs_in(folder)
+    notes = [f"poses are found anew: {note}" for note in other_cameras(place.root)]
     if unread := unread_photographs(place):
         count = f"{len(unread)} photographs are of formats that are"
         if len(unread) == 1:

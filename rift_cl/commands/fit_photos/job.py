@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import time
-from collections.abc import Generator, Iterator
+from collections.abc import Generator, Iterator, Sequence
 
 from rift_cl.commands.cameras.arc import check_places, place_notes
 from rift_cl.commands.cameras.fit_cameras import CAMERA_FILES, save_fit_cameras, with_poses
@@ -120,6 +120,7 @@ class Fit(FitRun[FitPhotosSettings]):
                 "splats": self._splats,
                 "device": self.device.name,
                 **self._known_without_poses(self.source),
+                **({"notes": "; ".join(self.source.notes)} if self.source.notes else {}),
             }
         cameras = [camera_at(view, self.downscale) for view in self.training_views]
         largest = max(camera.height * camera.width for camera in cameras)
@@ -205,13 +206,14 @@ class Fit(FitRun[FitPhotosSettings]):
     def _work(self) -> Iterator[Report]:
         settings = self.settings
         self.folder.make()
-        capture = self.source
+        capture, told = self.source, 0
         if isinstance(capture, BareInput):
+            # Before the poses are looked for, which takes long and may not be what is wanted.
+            told = self._tell(capture.notes)
             capture = yield from capture.find()
             self._split(capture)
             self._check_sizes()
-        for note in self._notes():
-            self.announce(f"rift: {note}")
+        self._tell(self._notes()[told:])
         pictures = self._pictures(self.training_views)
         if settings.training.refine_exposures and pictures.any_cut_out():
             raise InputError(
@@ -272,8 +274,7 @@ class Fit(FitRun[FitPhotosSettings]):
             *doubt_notes(held_out),
         ]
         refined = [*pose_notes(self.metrics), *exposure_notes(self.metrics)]
-        for note in [*refined, *doubts]:
-            self.announce(f"rift: {note}")
+        self._tell([*refined, *doubts])
         octaves = octave_notes(self.metrics)
         history = history_notes(self._history)
         notes = [*self._notes(), *octaves, *ramp, *refined, *history, *doubts]
@@ -389,6 +390,12 @@ class Fit(FitRun[FitPhotosSettings]):
         in_loss = self.training_views if self.settings.training.ssim_weight else ()
         scored = (view for views in self._scored().values() for view in views)
         check_window([*in_loss, *scored], self.downscale)
+
+    def _tell(self, notes: Sequence[str]) -> int:
+        """Say notes, and how many there were."""
+        for note in notes:
+            self.announce(f"rift: {note}")
+        return len(notes)
 
     def _notes(self) -> list[str]:
         """What was decided about the photographs, and what of them is not used."""

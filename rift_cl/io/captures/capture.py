@@ -8,8 +8,9 @@ from pathlib import Path
 
 from rift_cl.errors import InputError
 from rift_cl.io.boundary import reading
-from rift_cl.io.captures.capture_notes import color_notes, part_notes
+from rift_cl.io.captures.capture_notes import color_notes, lens_notes, part_notes
 from rift_cl.io.captures.colmap_model import MODEL_FOLDERS, find_model, open_model
+from rift_cl.io.captures.other_cameras import other_cameras, other_program, way_out
 from rift_cl.io.captures.photograph_folder import (
     other_files,
     photograph_names,
@@ -35,13 +36,6 @@ __all__ = [
 ]
 
 # NeRF's synthetic scenes have a file for each part; the first is what is trained on.
-# Whose cameras files with these endings usually are.
-_PROGRAMS = {
-    ".csv": "RealityCapture",
-    ".nvm": "VisualSFM",
-    ".out": "Bundler",
-    ".xml": "Metashape",
-}
 _TRANSFORMS = ("transforms.json", "transforms_train.json")
 
 
@@ -80,8 +74,9 @@ def open_capture(
         file = _transforms(path)
         if file is not None and images is None:
             capture = open_transforms(file, photographs=photographs)
-            if file != path and file.name == _TRANSFORMS[1]:
-                capture = replace(capture, notes=(*capture.notes, *part_notes(file)))
+            if file != path:
+                notes = part_notes(file) if file.name == _TRANSFORMS[1] else []
+                capture = replace(capture, notes=(*capture.notes, *notes, *_model_notes(file)))
             return _told(capture, photographs)
         model = find_model(path)
     if model is not None:
@@ -100,15 +95,28 @@ def open_capture(
     raise InputError(
         f"{path}: holds no capture; looked for {' and '.join(_TRANSFORMS)}, and for cameras "
         f"and images, .bin or .txt, of a COLMAP model in {', '.join(MODEL_FOLDERS)}"
-        f"{hint if bare else ''}"
+        f"{hint if bare else ''}{''.join(f'; {note}' for note in other_cameras(path))}"
     )
 
 
+def _model_notes(file: Path) -> list[str]:
+    """That a COLMAP model lies beside the transforms.json that was taken of a folder."""
+    model = find_model(file.parent)
+    if model is None:
+        return []
+    way = "move that file away" if model[0].samefile(file.parent) else "name its folder"
+    return [
+        f"{file.name} is taken of {file.parent}, and the COLMAP model in {model[0]} is left alone, "
+        f"its sparse points too: {way} to use it instead"
+    ]
+
+
 def _told(capture: Capture, photographs: bool) -> Capture:
-    """With what is to be said of the photographs' colours, if they are there."""
+    """With what is to be said of the photographs' colours and lenses, if they are there."""
     if not photographs:
         return capture
-    return replace(capture, notes=(*capture.notes, *color_notes(capture.views)))
+    more = *lens_notes(capture.views), *color_notes(capture.views)
+    return replace(capture, notes=(*capture.notes, *more))
 
 
 def capture_name(path: Path) -> str:
@@ -156,15 +164,12 @@ def _transforms(path: Path) -> Path | None:
     if not path.exists():
         raise InputError(f"{path}: there is no such file or folder")
     if not path.is_dir():
+        if program := other_program(path):
+            raise InputError(
+                f"{path}: holds cameras of {program.name}, which are not read; to use them, "
+                f"{program.way}"
+            )
         if path.suffix.lower() != ".json":
-            raise InputError(f"{path}: a capture is a .json file or a folder{_way_out(path)}")
+            raise InputError(f"{path}: a capture is a .json file or a folder{way_out(path)}")
         return path
     return next((path / name for name in _TRANSFORMS if (path / name).is_file()), None)
-
-
-def _way_out(path: Path) -> str:
-    """What to do with the cameras of a program whose files are not read; the end of a sentence."""
-    program = _PROGRAMS.get(path.suffix.lower())
-    if program is None:
-        return ""
-    return f"; if it holds cameras of {program}, export them as a COLMAP model and name its folder"

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rift_cl.errors import RiftError
+from rift_cl.geometry.lens_distortion import Lens
 from rift_cl.io.captures.capture_paths import MASK_FOLDERS, CaptureFolder, masks_named
 from rift_cl.io.captures.photograph_folder import photograph_names
 from rift_cl.io.captures.view import View
@@ -27,6 +28,9 @@ from rift_cl.io.images.read_picture import read_picture_header
 _SCORED = ("transforms_val.json", "transforms_test.json")
 # Photographs whose headers are read for their colours, and whose numbers are for their range.
 _LOOKED_AT, _READ = 8, 2
+# Cells along each edge of a picture whose areas are added up, and the least share of a photograph
+# that is used without a word.
+_CELLS, _NOTABLE = 64, 0.8
 # Suffixes of a format that other programs also write display light in, as floating-point numbers.
 _TIFF = (".tif", ".tiff")
 
@@ -102,6 +106,49 @@ def color_notes(views: Sequence[View]) -> list[str]:
     return list(notes.values())
 
 
+def lens_notes(views: Sequence[View]) -> list[str]:
+    """How much of their photographs the widest lenses lose, if that is notable.
+
+    A pinhole of the same size and focal length, which a photograph is turned into, sees less than
+    a wide fisheye does.
+    """
+    through = [(view.lens, view.camera.size, view.crop_radius) for view in views]
+    shares = {key: 1.0 if key[0] is None else _share_used(key[0], *key[1:]) for key in set(through)}
+    found = [(shares[key], view.name) for key, view in zip(through, views, strict=True)]
+    losing = [one for one in found if one[0] < _NOTABLE]
+    if not losing:
+        return []
+    share, name = min(losing)
+    return [
+        f"{len(losing)} of {len(views)} photographs lose what a pinhole of their size and focal "
+        f"length does not see once the lens is undone: {100 * share:.0f} % of the pixels of {name} "
+        "are used. To use more, undistort them to wider pinholes first, as COLMAP's "
+        "image_undistorter does"
+    ]
+
+
+def _share_used(lens: Lens, size: tuple[int, int], crop_radius: float | None) -> float:
+    """Which share of what a photograph shows is seen by the pinhole that it is turned into.
+
+    The pinhole's picture is cut into cells, whose areas in the photograph are added up.
+    """
+    high, wide = size
+    x, y = np.linspace(0, wide, _CELLS + 1), np.linspace(0, high, _CELLS + 1)
+    corners = np.stack(np.meshgrid(x, y), axis=-1)
+    places = lens.distort(corners)
+    seen = np.all((places >= 0) & (places <= (wide, high)), axis=-1)
+    shown = float(wide * high)
+    if crop_radius is not None:
+        middle = (wide / 2, high / 2)
+        seen &= np.hypot(*np.moveaxis(places - middle, -1, 0)) < crop_radius
+        shown *= np.mean(np.hypot(*np.moveaxis(corners - middle, -1, 0)) < crop_radius)
+    whole = seen[1:, 1:] & seen[1:, :-1] & seen[:-1, 1:] & seen[:-1, :-1]
+    # Half the cross product of a cell's diagonals.
+    down, up = places[1:, 1:] - places[:-1, :-1], places[:-1, 1:] - places[1:, :-1]
+    areas = np.abs(down[..., 0] * up[..., 1] - down[..., 1] * up[..., 0]) / 2
+    return float(areas[whole].sum()) / shown if shown else 0.0
+
+
 def range_notes(views: Sequence[View], *, downscale: int, light: LightKind) -> list[str]:
     """A sentence about floating-point photographs that hold less than black or more than white.
 
@@ -136,9 +183,10 @@ def _some(views: Sequence[View]) -> Sequence[View]:
 
 def _color_sentence(path: Path, header: PictureHeader) -> str:
     if header.profile:
+        taken = "linear sRGB" if header.linear else "sRGB"
         return (
             f"{path.name} has the colour profile {header.profile!r}, which is not applied: colours "
-            "are taken as sRGB"
+            f"are taken as {taken}"
         )
     if header.linear and not header.floating:
         return f"{path.name} says that its codes are linear light (gamma 1), and is read so"

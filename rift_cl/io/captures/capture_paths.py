@@ -101,11 +101,27 @@ class CaptureFolder:
         return Path(os.path.normpath(self.path / (name.replace("\\", "/") + suffix)))
 
     def _demand_inside(self, where: str, name: str, path: Path) -> None:
-        if not path.resolve().is_relative_to(self._real):
+        if path.resolve().is_relative_to(self._real):
+            return
+        link = self._link_out(path)
+        if link is None:
             raise PathEscapeError(
                 f"{where}: leads to {_short(name)}, which is outside the folder {self.root}; put "
                 "that file there and mend the path"
             )
+        raise PathEscapeError(
+            f"{where}: {link} is a link to {link.resolve()}, outside the folder {self.root}, and "
+            "is not followed: in a capture of strangers it could lead to any file. Put there what "
+            "it leads to ('cp -rL' copies a folder with all that its links lead to)"
+        )
+
+    def _link_out(self, path: Path) -> Path | None:
+        """The link on the way to a path inside the folder by which it leads out, if one does."""
+        if not path.is_relative_to(self.root):
+            return None
+        way = [path, *path.parents]
+        inside = reversed(way[: way.index(self.root)])
+        return next((p for p in inside if not p.resolve().is_relative_to(self._real)), None)
 
 
 def mask_beside(name: str) -> str:

@@ -45,10 +45,10 @@ def read_cameras(path: Path) -> list[CameraRecord]:
     names = dict(enumerate(MODEL_NAMES))
     cameras = []
     with _opened(path) as file:
-        for index in range(file.count("cameras", _CAMERA.size)):
+        for _ in range(file.count("cameras", _CAMERA.size)):
             number, model, width, height = file.take(_CAMERA)
             name = names.get(model, f"number {model}")
-            count = parameter_count(f"{path}: camera {index}", name)
+            count = parameter_count(f"{path}: camera {number}", name)
             parameters = file.take(struct.Struct(f"<{count}d"))
             cameras.append(CameraRecord(number, name, width, height, parameters))
     return cameras

@@ -27,6 +27,8 @@ from rift_cl.io.captures.poses import view_of_quaternion
 from rift_cl.io.captures.view import Capture, View, check_views, finite_points, located
 
 MODEL_FOLDERS = ("sparse/0", "sparse", ".")
+# Numbers of a text and of a binary model that are so near are the same, written with few digits.
+_SAME = 1e-4
 _READERS: dict[str, ModuleType] = {".bin": colmap_binary, ".txt": colmap_text}
 
 
@@ -34,10 +36,13 @@ def find_model(folder: Path) -> tuple[Path, str] | None:
     """Folder of the COLMAP model that belongs to a capture's folder, and suffix of its files."""
     for name in MODEL_FOLDERS:
         for suffix in _READERS:
-            files = (folder / name / (part + suffix) for part in ("cameras", "images"))
-            if all(file.is_file() for file in files):
+            if _has_model(folder / name, suffix):
                 return folder / name, suffix
     return None
+
+
+def _has_model(folder: Path, suffix: str) -> bool:
+    return all((folder / (part + suffix)).is_file() for part in ("cameras", "images"))
 
 
 def open_model(
@@ -67,11 +72,64 @@ def open_model(
         views = [replace(view, upright=True) for view in views]
     checked = check_views(path, views)
     points, colors, error = _points(model / f"points3D{suffix}", reader)
-    notes = mask_notes(images, checked)
+    notes = [*mask_notes(images, checked), *_other_form_notes(model, suffix, cameras, records)]
     # Of poses that we had found ourselves, this was said then.
     if photographs and not is_upright(model):
         notes += [f"{note}{_others_in_words(model)}" for note in pose_notes(images, checked)]
     return Capture(checked, points, colors, model, error, tuple(notes))
+
+
+def _other_form_notes(
+    model: Path, suffix: str, cameras: dict[int, CameraRecord], records: list[ImageRecord]
+) -> list[str]:
+    """That the same folder has another model, as text beside binary files, which says otherwise."""
+    other = next(form for form in _READERS if form != suffix)
+    if not _has_model(model, other):
+        return []
+    # Damage in what is not used is no matter.
+    with suppress(RiftError):
+        reader = _READERS[other]
+        found = {camera.number: camera for camera in reader.read_cameras(model / f"cameras{other}")}
+        images = reader.read_images(model / f"images{other}")
+        if not _agree(_said(cameras, records), _said(found, images)):
+            return [
+                f"{model} holds two models that differ: that of its {suffix} files is read, that "
+                f"of its {other} files is left alone; keep the one that is meant"
+            ]
+    return []
+
+
+def _said(
+    cameras: dict[int, CameraRecord], records: list[ImageRecord]
+) -> dict[str, tuple[str, NDArray[np.float64]]]:
+    """Camera model, and all numbers of pose and camera, of each photograph."""
+    taken = [(image, cameras[image.camera]) for image in records if image.camera in cameras]
+    return {
+        image.name: (
+            camera.model,
+            np.array(
+                [
+                    *view_of_quaternion(image.quaternion, image.shift).ravel(),
+                    *(camera.width, camera.height, *camera.parameters),
+                ]
+            ),
+        )
+        for image, camera in taken
+    }
+
+
+def _agree(
+    one: dict[str, tuple[str, NDArray[np.float64]]],
+    other: dict[str, tuple[str, NDArray[np.float64]]],
+) -> bool:
+    """Whether two models say the same, but for digits that a text may lack."""
+    if {name: model for name, (model, _) in one.items()} != {
+        name: model for name, (model, _) in other.items()
+    }:
+        return False
+    numbers = ([said[name][1] for name in one] for said in (one, other))
+    first, second = (np.concatenate([np.empty(0), *arrays]) for arrays in numbers)
+    return bool(np.allclose(first, second, rtol=_SAME, atol=_SAME))
 
 
 def _others_in_words(model: Path) -> str:

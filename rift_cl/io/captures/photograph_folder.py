@@ -21,7 +21,7 @@ from rift_cl.io.boundary import check_claim, reading
 from rift_cl.io.captures.capture_paths import CaptureFolder, mask_beside, mask_of
 from rift_cl.io.captures.view_image import check_colors, read_photograph, upright
 from rift_cl.io.images.display_light import to_display
-from rift_cl.io.images.image_format import SUFFIXES
+from rift_cl.io.images.image_format import SUFFIXES, UNREAD
 from rift_cl.io.images.picture_header import PictureHeader
 from rift_cl.io.images.pixels import write_pixels
 from rift_cl.io.images.read_picture import read_picture_header
@@ -30,11 +30,6 @@ from rift_cl.progress import Report
 
 # Formats that every release of COLMAP reads code for code.
 _PLAIN = (".png", ".jpg", ".jpeg")
-# Photographs, too, of formats that are not read: raw files of cameras, and what the web uses.
-_UNREAD = (
-    *(".arw", ".cr2", ".cr3", ".dng", ".nef", ".orf", ".pef", ".raf", ".raw", ".rw2", ".srw"),
-    *(".avif", ".bmp", ".gif", ".jp2", ".jxl", ".psd", ".tga", ".webp"),
-)
 
 
 @dataclass(frozen=True)
@@ -107,7 +102,7 @@ def unread_photographs(place: CaptureFolder) -> list[str]:
 
 
 def _unread(name: str) -> bool:
-    return Path(name).suffix.lower() in _UNREAD and not name.startswith(".")
+    return Path(name).suffix.lower() in UNREAD and not name.startswith(".")
 
 
 def _file_names(place: CaptureFolder) -> list[str]:

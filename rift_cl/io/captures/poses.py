@@ -11,8 +11,11 @@ from numpy.typing import ArrayLike, NDArray
 
 from rift_cl.errors import InputError, NonFiniteError
 
-# What ``Camera`` accepts too: rotations that were written with a few digits.
-_RIGID = 1e-3
+# How far M M' may be from 1: three digits behind the point leave 1.8e-3 of a rotation.
+_RIGID = 2e-3
+# How far from 1 two digits leave what a rotation stretches by, and how much its three stretches
+# differ at most where a scene was scaled and nothing rounded.
+_ROUNDED, _SCALED = 0.02, 1e-5
 
 
 def view_of_opengl(camera_to_world: ArrayLike) -> NDArray[np.float64]:
@@ -51,16 +54,29 @@ def view_of_quaternion(quaternion: ArrayLike, shift: ArrayLike) -> NDArray[np.fl
     return _motion(rotation, shift)
 
 
+def rigid_error(matrix: ArrayLike) -> float:
+    """How far a matrix (3, 3) is from a rotation: the largest entry of |M M' - 1|."""
+    rotation = np.asarray(matrix, np.float64)
+    with np.errstate(all="ignore"):
+        return float(np.abs(rotation @ rotation.T - np.eye(3)).max())
+
+
 def _nearest_rotation(matrix: NDArray[np.float64]) -> NDArray[np.float64]:
     with np.errstate(all="ignore"):
         left, stretch, right = np.linalg.svd(matrix)
-        error = float(np.abs(matrix @ matrix.T - np.eye(3)).max())
+    error = rigid_error(matrix)
     found: NDArray[np.float64] = left @ right
     if error <= _RIGID and np.linalg.det(found) > 0:
         return found
     if np.linalg.det(found) < 0:
         raise InputError("the pose mirrors the scene, wanted a rotation and a shift")
-    if stretch[0] - stretch[2] <= _RIGID * stretch[0] and stretch[0] > 0:
+    spread = stretch[0] - stretch[2]
+    if np.abs(stretch - 1).max() <= _ROUNDED and spread > _SCALED:
+        raise InputError(
+            f"the pose is no rigid motion: its rotation is off by {error:.2g}, as one is that was "
+            "written with too few digits. Write five or more behind the point"
+        )
+    if spread <= _RIGID * stretch[0] and stretch[0] > 0:
         raise InputError(
             f"the pose scales the scene by {stretch[1]:.6g}, wanted a rotation and a shift: "
             "divide the first three columns by that"

@@ -24,7 +24,7 @@ from rift_cl.geometry.lens_distortion import LENS_MODELS, lens_of
 from rift_cl.io.captures.capture_notes import mask_notes
 from rift_cl.io.captures.capture_paths import CaptureFolder, mask_of
 from rift_cl.io.captures.point_cloud import read_point_cloud
-from rift_cl.io.captures.poses import view_of_opengl
+from rift_cl.io.captures.poses import rigid_error, view_of_opengl
 from rift_cl.io.captures.split_lists import split_by_lists
 from rift_cl.io.captures.transforms_focal import focal_lengths
 from rift_cl.io.captures.view import Capture, View, check_views, located
@@ -48,6 +48,8 @@ _ALONG = {"w": "wide", "h": "high"}
 # A principal point this share of the picture from its middle is doubted: that of a picture half as
 # large lies at a quarter, those that calibrations find within a tenth.
 _DOUBTED = 0.2
+# What four digits behind the point leave of a rotation.
+_FOUR_DIGITS = 2e-4
 
 
 def open_transforms(
@@ -73,6 +75,7 @@ def open_transforms(
         *split_notes,
         *_center_notes(path, checked),
         *_crop_notes(path, checked),
+        *_digit_notes(path, frames),
     )
     ply = top.text("ply_file_path")
     if ply is None:
@@ -104,6 +107,19 @@ def _crop_notes(path: Path, views: Sequence[View]) -> list[str]:
         f"{path}: {_CROP!r} leaves out of {len(cropped)} of {len(views)} photographs what is "
         f"farther from their middle, more than {cropped[0].crop_radius:g} pixels in "
         f"{cropped[0].name}"
+    ]
+
+
+def _digit_notes(path: Path, frames: Sequence[Fields]) -> list[str]:
+    """That poses are less exact than their photographs, because of how they are written."""
+    errors = [rigid_error(frame.pose("transform_matrix")[:, :3]) for frame in frames]
+    few = [error for error in errors if error > _FOUR_DIGITS]
+    if not few:
+        return []
+    return [
+        f"{path}: the poses of {len(few)} of {len(frames)} photographs have few digits, which "
+        f"leave their rotations off by up to {max(few):.1g}: the nearest rotations are taken, and "
+        "'rift fit --refine-poses' can make up for it"
     ]
 
 

@@ -2,7 +2,8 @@
 
 nerfstudio's flavour: each frame has intrinsics of its own and a camera-to-world pose with OpenGL's
 axes; the opening of a lens is ``aperture_radius``, ``focus_distance`` and ``wavelength``, what it
-distorts ``camera_model`` and its coefficients by COLMAP's names.
+distorts ``camera_model`` and its coefficients by COLMAP's names. nerfstudio reads whether cameras
+are fisheyes from the top of the file alone, which therefore names the model of all frames.
 """
 
 from __future__ import annotations
@@ -16,6 +17,9 @@ import numpy as np
 from rift_cl.errors import InputError
 from rift_cl.geometry.camera import Camera
 from rift_cl.geometry.lens_distortion import LENS_MODELS, Lens
+
+_PINHOLE, _OPENCV = "PINHOLE", "OPENCV"
+_WITHIN_OPENCV = {_PINHOLE, "SIMPLE_RADIAL", "RADIAL", _OPENCV}
 
 
 def transforms_of(
@@ -40,7 +44,10 @@ def transforms_of(
             )
     more = fields or [{}] * len(cameras)
     frames = [_frame(*entry) for entry in zip(cameras, names, more, strict=True)]
-    return {"camera_model": "PINHOLE", "frames": frames}
+    models = {frame.get("camera_model", _PINHOLE) for frame in frames}
+    if len(models) > 1:
+        frames = [{"camera_model": _PINHOLE, **frame} for frame in frames]
+    return {**_top_model(models), "frames": frames}
 
 
 def lens_fields(lens: Lens | None, crop_radius: float | None = None) -> dict[str, Any]:
@@ -59,6 +66,16 @@ def lens_fields(lens: Lens | None, crop_radius: float | None = None) -> dict[str
         **dict(zip(names, lens.coefficients, strict=True)),
         **circle,
     }
+
+
+def _top_model(models: set[str]) -> dict[str, str]:
+    """The camera model at the top: that of all frames, or one that has them all as special cases.
+
+    Nothing where there is none, as of fisheyes among others.
+    """
+    if len(models) <= 1:
+        return {"camera_model": next(iter(models), _PINHOLE)}
+    return {"camera_model": _OPENCV} if models <= _WITHIN_OPENCV else {}
 
 
 def _frame(camera: Camera, name: str, more: Mapping[str, Any]) -> dict[str, Any]:

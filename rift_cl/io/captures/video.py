@@ -1,8 +1,9 @@
 """A video becomes photographs: of each stretch of it the sharpest frame.
 
 A hand that walks round something blurs most frames a little and some not at all. The video is cut
-into stretches of equal length, one for each frame that is wanted, and of each the frame whose
-Laplacian varies most is kept (Pech-Pacheco et al. 2000): frames are evenly spaced, and sharp.
+into stretches of as many frames each, one for each frame that is wanted, and of each the frame
+whose Laplacian varies most is kept (Pech-Pacheco et al. 2000): frames are evenly spaced, and sharp.
+Where a phone changes its frame rate, stretches differ in time.
 
 PyAV decodes, in a child process (``video_frames``).
 """

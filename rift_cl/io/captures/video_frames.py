@@ -146,10 +146,28 @@ def _sharpness(path: Path, frame: Any) -> float:
 
 
 def _upright(path: Path, frame: Any) -> NDArray[np.uint8]:
-    """The frame's colours, turned as the file says that it is shown."""
+    """The frame's colours, turned and mirrored as the file says that it is shown."""
     with reading(path, "the video"):
         codes = frame.reformat(format="rgb24", src_colorspace=_matrix(frame)).to_ndarray()
-    return np.ascontiguousarray(np.rot90(codes, round(frame.rotation / 90)))
+        a, b, c, d = _display_matrix(frame)
+    if abs(b) + abs(c) > abs(a) + abs(d):
+        codes, a, d = codes.swapaxes(0, 1), c, b
+    return np.ascontiguousarray(codes[:: -1 if d < 0 else 1, :: -1 if a < 0 else 1])
+
+
+def _display_matrix(frame: Any) -> tuple[int, int, int, int]:
+    """QuickTime's a, b, c, d: a pixel is shown at x' = a x + c y, y' = b x + d y, y downwards.
+
+    PyAV's own ``rotation`` knows no mirrors.
+    """
+    from av.sidedata.sidedata import Type
+
+    for data in frame.side_data:
+        if data.type == Type.DISPLAYMATRIX:
+            # FFmpeg has the matrix by rows, in the byte order of the machine.
+            a, b, _, c, d, *_ = np.frombuffer(bytes(data), np.int32, 9).tolist()
+            return a, b, c, d
+    return 1, 0, 0, 1
 
 
 def _matrix(frame: Any) -> Any:

@@ -7,6 +7,7 @@ a mean: alpha says where a scene is empty, a mask where nobody knows.
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 
 import numpy as np
@@ -16,6 +17,7 @@ from rift_cl.errors import FileFormatError, InputError, NonFiniteError, ShapeErr
 from rift_cl.io.boundary import check_claim
 from rift_cl.io.captures.view import View, camera_at
 from rift_cl.io.images.display_light import LightKind, to_display, to_linear
+from rift_cl.io.images.image_format import SUFFIXES
 from rift_cl.io.images.picture_header import PictureHeader
 from rift_cl.io.images.read_picture import read_picture_header, read_pixels
 from rift_cl.io.images.resample import shrunk, undistorted
@@ -33,8 +35,8 @@ _SHOWN = {
     7: (-1, True),
     8: (1, False),
 }
-# Suffixes of formats that do not keep every code, and what is white in a mask of such.
-_LOSSY, _HALF = (".jpg", ".jpeg"), 0.5
+# The format that does not keep every code, and what is white in a mask of it.
+_LOSSY, _HALF = "jpeg", 0.5
 # The code 1 of 8 bits, with room for rounding.
 _ONE_CODE = 1.01 / 255
 # So many greys in a dark mask, black among them, may be labels; one with soft edges has more.
@@ -158,7 +160,8 @@ def _checked_header(view: View, budget: int | None) -> PictureHeader:
     header = read_picture_header(view.image)
     size = view.camera.size
     fits = size == header.shown_size or (size == header.size and not view.upright)
-    _demand_fit(view, view.image, header, fits)
+    way_out = "" if fits else _rescaled(header.shown_size, size)
+    _demand_fit(view, view.image, header, fits, way_out)
     # Numbers that are held for a pixel at one time: as stored, as RGBA, without the lens, a mask.
     numbers = header.channels + 4 + (0 if view.lens is None else 8)
     if view.mask is not None:
@@ -172,13 +175,30 @@ def _checked_header(view: View, budget: int | None) -> PictureHeader:
     return header
 
 
-def _demand_fit(view: View, path: Path, header: PictureHeader, fits: bool) -> None:
+def _demand_fit(
+    view: View, path: Path, header: PictureHeader, fits: bool, way_out: str = ""
+) -> None:
     check_colors(path, header)
     if not fits:
         raise ShapeError(
             f"{path}: is {_size(header.size)} pixels, the camera of view {view.name!r} says "
-            f"{_size(view.camera.size)}"
+            f"{_size(view.camera.size)}{way_out}"
         )
+
+
+def _rescaled(size: tuple[int, int], wanted: tuple[int, int]) -> str:
+    """What to do with a photograph that was made smaller or larger; the end of a sentence."""
+    scale = math.sqrt(math.prod(size) / math.prod(wanted))
+    if any(abs(scale * extent - found) > 1 for extent, found in zip(wanted, size, strict=True)):
+        return "; the photograph may be a crop, or another one"
+    factor = round(1 / scale)
+    intrinsics = f"multiply size, focal lengths and principal point of the camera by {scale:.4g}"
+    if factor <= 1:
+        return f"; it has the same shape: {intrinsics}"
+    return (
+        f"; it has the same shape: take the photographs that the camera was found for, and "
+        f"downscale={factor} (--downscale {factor}) to fit them smaller, or {intrinsics}"
+    )
 
 
 def upright(image: Image, orientation: int) -> Image:
@@ -245,7 +265,7 @@ def _coverage(path: Path, budget: int | None) -> Image:
     mask: Image = colors.mean(axis=-1, dtype=np.float32)
     if header.alpha:
         mask = _with_own_alpha(path, mask, codes[..., -1])
-    if path.suffix.lower() in _LOSSY:
+    if SUFFIXES[path.suffix.lower()] == _LOSSY:
         # Black and white come back as greys wherever an edge is near.
         return (mask > _HALF).astype(np.float32)
     if not header.floating:

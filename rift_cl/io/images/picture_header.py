@@ -10,9 +10,12 @@ from rift_cl.io.boundary import reading
 from rift_cl.io.images.heic import UNNAMED, heic_profile, heic_taken_by, opened_heic
 from rift_cl.io.images.image_format import HEIC
 from rift_cl.io.images.pixels import opened_image
+from rift_cl.io.images.primaries import png_primaries, unlike_srgb
 
 # Beginnings of OpenImageIO's names for the curve and the primaries of sRGB, or nearly them.
 _SRGB = ("srgb_rec709", "g22_rec709", "gamma2.2")
+# What EXIF says of colours that are neither sRGB nor, by its own words, anything else.
+_UNCALIBRATED = 65535
 # What Facebook calls the small profile of sRGB in its photographs.
 _SMALL_SRGB = "c2"
 _TAKEN_BY = ("Make", "Model", "Exif:FocalLength", "Exif:FocalLengthIn35mmFilm")
@@ -34,8 +37,9 @@ class PictureHeader:
             5 to 8 with the axes swapped. HEIC comes turned from its decoder, and is 1 here.
         taken_by: maker and model of the camera and its focal lengths, as EXIF has them; empty
             where it has none.
-        profile: the name of the colour profile or colour space that the file says codes are in;
-            empty where that is sRGB's or linear light, or nothing is said.
+        profile: the name of the colour profile, colour space or primaries that the file says its
+            numbers are in; empty where that is sRGB's or linear light of its primaries, or nothing
+            is said.
     """
 
     size: tuple[int, int]
@@ -100,15 +104,27 @@ def _header(path: Path, format: str) -> PictureHeader:
             eight_bit=str(spec.format) == "uint8",
             orientation=orientation if 1 <= orientation <= 8 else 1,
             taken_by=tuple(str(value) for value in taken_by if value is not None),
-            profile="" if floating else _profile(spec, space),
+            profile=_of_light(spec) if floating else _profile(path, spec, space),
         )
 
 
-def _profile(spec: Any, space: str) -> str:
+def _of_light(spec: Any) -> str:
+    """The primaries of floating-point numbers, where they are stated and not those of sRGB."""
+    stated = spec.getattribute("chromaticities")
+    fits = isinstance(stated, tuple) and len(stated) == 8
+    return unlike_srgb(stated) if fits else ""
+
+
+def _profile(path: Path, spec: Any, space: str) -> str:
     """The profile of codes, or else their colour space, where that is neither sRGB nor linear."""
     if spec.getattribute("ICCProfile") is not None:
         name = spec.get_string_attribute("ICCProfile:profile_description")
         return _unlike_srgb(name or UNNAMED)
+    if spec.get_int_attribute("Exif:ColorSpace", 0) == _UNCALIBRATED:
+        return "uncalibrated, as cameras mark Adobe RGB"
+    stated = png_primaries(path) if path.suffix.lower() == ".png" else None
+    if stated is not None and (name := unlike_srgb(stated)):
+        return name
     if space in ("", "srgb") or space.startswith(("lin", *_SRGB)):
         return ""
     gamma = spec.get_float_attribute("oiio:Gamma", 0.0)
