@@ -9,10 +9,9 @@ import pytest
 
 import rift_cl as rift
 from rift_cl.commands.cli import main
-from rift_cl.commands.fit_xray.settings import FitXraySettings
-from rift_cl.commands.python_words import in_python
 from rift_cl.commands.fit_xray.job import XrayFit
 from rift_cl.commands.fit_xray.settings import FitXraySettings
+from rift_cl.commands.python_words import in_python
 from rift_cl.geometry.seen_grid import seen_grid
 from rift_cl.io.volumes import read_volume, read_volume_place
 
