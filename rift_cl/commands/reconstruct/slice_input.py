@@ -45,6 +45,7 @@ from rift_cl.geometry import Fan, Parallel, at_axis
 from rift_cl.geometry.length_units import length_unit
 from rift_cl.io.number_list import read_numbers
 from rift_cl.io.scans.scan_file import ScanFile
+from rift_cl.operators.filters.directions import Directions
 from rift_cl.reconstruct import Attenuation
 from rift_cl.reconstruct.axis import AxisEstimate
 from rift_cl.reconstruct.direct.fan_rebin import covered_rays, rebin_fan
@@ -619,10 +620,9 @@ def _listed(bins: tuple[int, ...]) -> str:
 
 
 def _gap_note(angles: NDArray[np.float64]) -> list[str]:
-    directions = np.sort(np.mod(angles, np.pi))
-    gaps = np.diff(directions, append=directions[0] + np.pi)
+    gaps = Directions.of(angles).gaps
     gap = float(gaps.max())
-    if gap <= max(_GAP_STEPS * np.pi / len(angles), _GAP):
+    if gap <= max(_GAP_STEPS * np.pi / len(gaps), _GAP):
         return []
     return [
         f"{np.rad2deg(gap):.0f} of 180 degrees have no view (limited angle): edges in these "
