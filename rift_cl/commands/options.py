@@ -21,7 +21,6 @@ from typing import (
     NamedTuple,
     TypeVar,
     get_args,
-    get_origin,
     get_type_hints,
 )
 
@@ -221,16 +220,16 @@ def shown_options(settings: type, default: Any = None) -> Iterator[ShownOption]:
 def gathered(words: Sequence[str], settings: type) -> list[str]:
     """A command line in which every list is given once: ``--test A --test B`` is ``--test A B``.
 
-    Argument parsers keep the last of them alone, and say nothing of the others. That suits
-    numbers and paths, where a later one overrides what a script begins with. Names, such as those
-    of two presets, are refused: whoever gives both means to have both.
+    Argument parsers keep the last of them alone, and say nothing of the others. That suits what a
+    script begins with and a later word overrides. Two presets are refused: whoever gives both means
+    to have both.
 
     Args:
         words: of the command line.
         settings: the class of the command's settings.
 
     Raises:
-        InputError: an option that takes one of several names is given more than once.
+        InputError: ``--preset`` is given more than once.
     """
     starts = [index for index, word in enumerate(words) if word.startswith("--")]
     names = [_plain_name(words[start]) for start in starts]
@@ -238,12 +237,9 @@ def gathered(words: Sequence[str], settings: type) -> list[str]:
     if not repeated:
         # What the options are takes time to read, which a command's help has not.
         return list(words)
-    options = [option for option in shown_options(settings) if option.name in repeated]
-    lists = {option.name for option in options if _is_list(option.kind)}
-    for option in options:
-        if option.name not in lists and _is_choice(option.kind):
-            name = option.name.replace("_", "-")
-            raise InputError(f"--{name} is given {names.count(option.name)} times, wanted once")
+    if "preset" in repeated:
+        raise InputError(f"--preset is given {names.count('preset')} times, wanted once")
+    lists = {option.name for option in shown_options(settings) if _is_list(option.kind)} & repeated
     if not lists:
         return list(words)
     values: dict[str, list[str]] = {name: [] for name in lists}
@@ -265,11 +261,6 @@ def _plain_name(word: str) -> str:
 def _is_list(kind: Any) -> bool:
     """Whether an option takes any number of values."""
     return Ellipsis in get_args(kind) or any(_is_list(part) for part in get_args(kind))
-
-
-def _is_choice(kind: Any) -> bool:
-    """Whether an option takes one of several names."""
-    return get_origin(kind) is Literal or any(_is_choice(part) for part in get_args(kind))
 
 
 def _first_paragraph(described: type) -> str:
