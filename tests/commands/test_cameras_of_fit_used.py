@@ -146,6 +146,7 @@ def test_distance_and_elevation_are_about_the_focus_and_up_that_are_used(alone, 
         assert bounds.elevation == pytest.approx(sign * np.degrees(np.arctan(0.5)), abs=1e-6)
 
 
+@pytest.mark.full
 def test_analysis_and_plans_take_a_fit_for_its_capture(alone, tmp_path):
     sampled = open_sampled(AnalyzeSettings(alone, out=tmp_path / "analysis"))
     assert sampled.views == 8

@@ -153,6 +153,7 @@ def test_a_run_goes_on_with_a_slab_that_a_worker_made(scan, tmp_path, monkeypatc
     assert axes[0]["center"] == axes[1]["center"]
 
 
+@pytest.mark.full
 def test_slabs_are_as_large_as_the_axis_found_makes_them(tmp_path):
     """About the detector's middle, which the axis is taken for at first, they are smaller."""
     angles = 2 * np.pi * np.arange(60) / 60

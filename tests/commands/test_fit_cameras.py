@@ -77,6 +77,7 @@ def test_refined_poses_are_those_that_are_kept(capture, fitted, tmp_path):
         assert 1e-6 < moved < 0.4 and np.array_equal(new.camera.K, old.camera.K)
 
 
+@pytest.mark.full
 def test_held_out_photographs_are_scored_as_fitted_and_as_given(capture, tmp_path, capsys):
     """What the fit prints is what is scored again with the cameras that it keeps."""
     fit, words = tmp_path / "fit", ["--refine-poses", "--refine-exposures", "--hold-out", "4"]

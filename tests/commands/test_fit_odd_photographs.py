@@ -64,6 +64,7 @@ def test_photographs_of_nothing_are_told(capture, tmp_path, capsys):
     assert (tmp_path / "fit" / "scene.ply").is_file()
 
 
+@pytest.mark.full
 def test_alpha_that_is_the_same_everywhere_cuts_out_nothing(capture, tmp_path, capsys):
     """Many programs write RGBA: the fit is that of the colours alone, to the bit."""
 

@@ -41,6 +41,7 @@ def fitted(capture, out, *more):
     return json.loads((out / "metrics.json").read_text())["scores"]
 
 
+@pytest.mark.full
 def test_no_unit_of_positions_changes_a_fit(capture, tmp_path):
     """Near planes, penalties, learning rates and starts all go by the size of the scene."""
     found, near = {}, {}

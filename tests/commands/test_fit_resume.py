@@ -63,6 +63,7 @@ def broken_off(given, after):
     return str(caught.value)
 
 
+@pytest.mark.full
 def test_the_config_of_a_fit_that_was_broken_off_goes_on_with_it(capture, tmp_path, capsys):
     """It says what was asked for; what was decided is in the checkpoint."""
     whole, cut = tmp_path / "whole", tmp_path / "cut"

@@ -51,6 +51,7 @@ def half(tmp_path):
     return path, float(rift.phantom.render(parts, grid).sum())
 
 
+@pytest.mark.full
 def test_a_half_acquisition_is_fitted_to_the_farther_end(half, tmp_path):
     path, mass = half
     sliced = rift.reconstruct_scan(path, tmp_path / "slices", center=5.0, format="h5")
@@ -76,6 +77,7 @@ def displaced(tmp_path):
     return saved(tmp_path / "displaced.npz", y, angles, center=np.array(scan.center), **LENGTHS)
 
 
+@pytest.mark.full
 def test_views_that_are_held_out_leave_a_displaced_detector_its_full_turn(displaced, tmp_path):
     _, _, metrics = fitted(displaced, tmp_path / "fit", center=7.0)
     assert metrics["scores"]["held out"]["fbp_error"] < 0.15
@@ -128,6 +130,7 @@ def leaning(tilt, rows=16, bins=48, views=40, center=22.3):
     return values, angles
 
 
+@pytest.mark.full
 def test_a_tilted_axis_is_turned_as_slices_have_it(tmp_path):
     path = saved(tmp_path / "leaning.npz", *leaning(3.0), pitch=1.0)
     found, given, unturned = (tmp_path / name for name in ("found", "given", "unturned"))

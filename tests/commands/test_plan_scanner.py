@@ -105,6 +105,7 @@ def test_planned_views_hold_the_detector_as_the_scanner_does():
         np.testing.assert_allclose(getattr(planned, name), getattr(further, name), atol=1e-9)
 
 
+@pytest.mark.full
 def test_a_plan_of_no_scanner_keeps_no_vectors_of_an_earlier_one(on_orbit, tmp_path):
     out = tmp_path / "out"
     shutil.copytree(on_orbit, out)

@@ -71,6 +71,7 @@ def test_a_worker_that_hangs_changes_no_bit(scan, tmp_path, monkeypatch):
     assert figures["workers"] >= 1
 
 
+@pytest.mark.full
 def test_a_run_goes_on_with_a_part_that_a_worker_made(scan, tmp_path, monkeypatch):
     """The function of a worker, here; then the rest without a cluster."""
     out = tmp_path / "out"
@@ -107,6 +108,7 @@ def test_a_worker_leaves_doubts_to_the_process_that_began_the_run(scan, tmp_path
     assert kept.missing() == [slice(0, 2), slice(4, ROWS)]
 
 
+@pytest.mark.full
 def test_a_part_is_projected_as_the_run_began(scan, tmp_path):
     """By costs these slices take a projector in real space."""
     out = tmp_path / "out"

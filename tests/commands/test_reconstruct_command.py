@@ -51,6 +51,7 @@ def test_two_runs_give_the_same_bits(scan, tmp_path):
     np.testing.assert_array_equal(first, second)
 
 
+@pytest.mark.full
 def test_a_small_budget_gives_the_same_bits(scan, tmp_path):
     whole = Reconstruction(ReconstructSettings(scan.counts, out=tmp_path / "whole", center=45))
     list(whole.run())

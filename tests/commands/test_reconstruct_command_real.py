@@ -44,6 +44,7 @@ def otsu(image):
     return edges[1:][np.nanargmax(between)]
 
 
+@pytest.mark.full
 def test_rings_of_the_tooth_go_and_its_edges_stay(shared_data, tmp_path):
     tooth, images = shared_data / "tooth" / "tooth.h5", {}
     for rings in ("on", "off"):

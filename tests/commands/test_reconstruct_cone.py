@@ -276,12 +276,13 @@ def test_a_volume_larger_than_the_memory_is_made_in_slabs(
         rift.reconstruct_scan(tall, tmp_path / "c", memory="3.2M", dtype="uint8", **common)
 
 
+@pytest.mark.full
 @pytest.mark.parametrize(
     "given",
     [
         {"method": "cgls"},
-        pytest.param({"method": "tv", "weights": "counts"}, marks=pytest.mark.full),
-        pytest.param({"method": "sirt", "subsets": 2}, marks=pytest.mark.full),
+        {"method": "tv", "weights": "counts"},
+        {"method": "sirt", "subsets": 2},
     ],
     ids=lambda given: given["method"],
 )

@@ -96,6 +96,7 @@ def test_what_follows_from_a_changed_option_is_decided_anew(
     assert now.max() == pytest.approx(value * before.max(), rel=0.25)
 
 
+@pytest.mark.full
 def test_another_method_has_no_filter_left_over(in_millimetres, tmp_path, capsys):
     tv, fbp, again = (tmp_path / name for name in ("tv", "fbp", "again"))
     config = ("--config", in_millimetres / "config.json")

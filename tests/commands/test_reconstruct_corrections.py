@@ -179,6 +179,7 @@ def test_a_tilted_axis_is_made_upright(tmp_path):
     assert "turned by 4.000 degrees" in notes(tmp_path / "right")
 
 
+@pytest.mark.full
 def test_a_tilt_that_the_rows_contradict_is_doubted(tmp_path):
     said = {}
     for degrees in (0.0, 4.0):

@@ -97,6 +97,7 @@ def test_a_part_of_a_turn_is_taken_as_it_is(tmp_path: Path, options: tuple[objec
     assert "have no view" in said
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("span", ["turn", "short"])
 def test_an_object_wider_than_the_fan_is_continued(tmp_path: Path, span: str) -> None:
     kind, scan = "wider than the detector", fan(SPANS[span], 79.5)

@@ -35,10 +35,9 @@ def scan(tmp_path_factory):
     return path
 
 
+@pytest.mark.full
 @pytest.mark.once
-@pytest.mark.parametrize(
-    "method", [m if m == "fbp" else pytest.param(m, marks=pytest.mark.full) for m in METHODS]
-)
+@pytest.mark.parametrize("method", METHODS)
 def test_slices_four_times_the_memory_have_the_same_bits(scan, tmp_path, method):
     common = {"dataset": "data", "theta": "angles", "angle_unit": "radians", "kind": "attenuation"}
     common |= {"center": 63.5, "method": method, "format": "h5", "pad": "off"}

@@ -108,6 +108,7 @@ def test_the_named_error_is_met_at_any_size(device, n, error):
     assert relative(A.T(y), exact.backproject(y)) <= error
 
 
+@pytest.mark.full
 def test_a_smaller_error_is_a_smaller_error(device):
     grid, scan = Grid((40, 40)), Parallel(np.linspace(0, np.pi, 50), bins=60)
     y = np.random.default_rng(3).standard_normal((50, 60))

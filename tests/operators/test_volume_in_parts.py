@@ -98,11 +98,8 @@ def test_not_even_a_part_fits(device):
             operator(normal(*operator.domain))
 
 
-@pytest.mark.parametrize(
-    "scan",
-    [CONE, FAN, pytest.param(LEANING, marks=pytest.mark.full)],
-    ids=["cone", "fan", "leaning"],
-)
+@pytest.mark.full
+@pytest.mark.parametrize("scan", [CONE, FAN, LEANING], ids=["cone", "fan", "leaning"])
 def test_fdk_filters_runs_of_views_and_backprojects_slabs(device, scan):
     whole = FDK(Projector(GRID, scan, device=device))
     A = Projector(GRID, scan, device=limited(device, memory_of(whole._A, 8, 1)))

@@ -229,6 +229,7 @@ def test_rows_of_air_have_no_vote(first, stop, slope):
     assert f"from {found.rows[0]:.0f} to {found.rows[-1]:.0f}" in found.in_words()
 
 
+@pytest.mark.full
 def test_rows_that_are_wanted_tell_the_axis_beside_air():
     stack = _beside_air(0.0, 1, 9)
     stack[:, 30:38] = 3 * _beside_air(0.0, 30, 38)[:, 30:38, ::-1]

@@ -73,7 +73,8 @@ def test_the_search_says_it():
     assert "as if the scan had gone round 360 degrees in place of 180" in words
 
 
-@pytest.mark.parametrize("turn", [pytest.param(FULL, marks=pytest.mark.full), SHORT])
+@pytest.mark.full
+@pytest.mark.parametrize("turn", [FULL, SHORT])
 def test_lengths_and_angles_of_fans(turn):
     scan = fan(turn)
     y = fan_sinogram(KINDS["porous"], scan)

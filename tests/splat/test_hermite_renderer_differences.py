@@ -144,6 +144,7 @@ def gradients_of(renderer, frame):
     return host | {"view": camera[:12].reshape(3, 4), "lens": camera[12:]}
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("way", WAYS)
 def test_image_is_the_twins(device, way):
     _, _, model, changes = WAYS[way]

@@ -86,6 +86,7 @@ def digests_elsewhere(python, threads):
     return json.loads(done.stdout)
 
 
+@pytest.mark.full
 def test_another_run_gives_the_same_bits(device):
     renderer, frame = drawn(device)
     assert digest(renderer, frame) == digest(renderer, frame) == digest(*drawn(device))

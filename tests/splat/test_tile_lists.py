@@ -79,6 +79,7 @@ def test_random_splats(device, splats, sort):
     _check(device, boxes, depth, tiles_x=17, tiles_y=11, sort=sort)
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("sort", [True, False])
 @pytest.mark.parametrize("least", [2, 3])
 def test_every_way_of_cutting_the_work(device, monkeypatch, least, sort):

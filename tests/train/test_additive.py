@@ -72,6 +72,7 @@ def test_what_is_not_kept_is_drawn_anew_to_the_same_bits(device, monkeypatch, ke
     assert few.energies().tobytes() == additive.energies().tobytes()
 
 
+@pytest.mark.full
 def test_a_pickle_gives_the_same_bits():
     additive, _ = additive_of(rift.default_device(), 1)
     again = pickle.loads(pickle.dumps(additive))

@@ -56,6 +56,7 @@ def same(first, second):
     )
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("kind", KINDS)
 def test_a_fit_goes_on_from_any_state_to_the_same_bits(device, kind):
     ball = Ball(device)

@@ -37,6 +37,7 @@ def trainer_of(device, kind="mcmc", **more):
     return Trainer(pictures, Parameters.of(device, raw), replace(SETTINGS, **given))
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("kind", KINDS)
 def test_a_fit_goes_on_from_any_state_to_the_same_bits(device, kind):
     whole = trainer_of(device, kind)

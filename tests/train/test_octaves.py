@@ -132,6 +132,7 @@ def _trainer(device, **more):
     return Trainer(_views(device, images, weights), splats, settings)
 
 
+@pytest.mark.full
 def test_a_fit_that_is_broken_off_on_a_level_goes_on_to_the_same_bits(device):
     whole, first, second = (_trainer(device, octaves=OctaveSettings(2, 0.4)) for _ in range(3))
     second.pictures = first.pictures = whole.pictures

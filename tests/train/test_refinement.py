@@ -188,6 +188,7 @@ def seen(camera, points):
     return at[:, :2] / at[:, 2:]
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("exposed", [False, True])
 def test_cameras_that_were_held_out_go_where_their_photographs_were_taken(device, exposed):
     """The trained cameras have moved together: those that were given badly are to follow them."""

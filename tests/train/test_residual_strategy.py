@@ -256,6 +256,7 @@ def test_what_was_seen_is_kept_and_checked(device):
         again.restore({})
 
 
+@pytest.mark.full
 def test_splats_with_modes_contribute_by_the_same_sums(device):
     """Modes of zero change no image, so that records of another layout say the same."""
     parameters, target = parameters_of(device), device.zeros((40, 50, 3))
