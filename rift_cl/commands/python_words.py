@@ -9,6 +9,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 from contextlib import contextmanager
+from functools import cache
 from typing import Any, Literal, get_args, get_origin
 
 from rift_cl.commands.options import shown_options
@@ -53,9 +54,15 @@ def in_python(said: str, *settings: type) -> str:
     """
     if "--" not in said:
         return said
-    kinds = {each.name: each.kind for some in settings for each in shown_options(some)}
+    kinds = _kinds(*settings)
     parts = _SHELL.split(_BOTH.sub(_one_of_both, said))
     return "".join(part if _SHELL.match(part) else _translated(part, kinds) for part in parts)
+
+
+@cache
+def _kinds(*settings: type) -> dict[str, Any]:
+    """The types of options by their names in Python; it takes a while to read them."""
+    return {each.name: each.kind for some in settings for each in shown_options(some)}
 
 
 def _one_of_both(said: re.Match[str]) -> str:
