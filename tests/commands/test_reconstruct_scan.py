@@ -67,7 +67,7 @@ def rift_volume(path):
         ({"method": "best"}, "method is 'best'"),
         ({"steps": "many", "method": "sirt"}, "steps is 'many'"),
         ({"dry_run": True}, "leave it out"),
-        ({"filter": "hann", "method": "sirt"}, "--filter"),
+        ({"filter": "hann", "method": "sirt"}, "filter does not apply"),
     ],
 )
 def test_what_cannot_be_used_is_told(scan, tmp_path, settings, sentence):
