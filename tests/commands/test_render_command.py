@@ -256,8 +256,11 @@ def test_what_makes_no_sense_is_named_and_leaves_nothing(scene, tmp_path, capsys
 
 def test_what_is_no_scene_is_named(tmp_path, capsys):
     (tmp_path / "notes.txt").write_text("no splats")
-    (tmp_path / "empty").mkdir()
+    for name in ("empty", "slices"):
+        (tmp_path / name).mkdir()
+    write_json(tmp_path / "slices/config.json", {"job": "reconstruct"})
     for scene, words in (("notes.txt", "no PLY file"), ("empty", "holds no scene.ply"),
+                         ("slices", "holds what 'rift reconstruct' made, and no scene.ply"),
                          ("nothing.ply", "no such file")):  # fmt: skip
         assert render(tmp_path / scene, tmp_path / "film") == 3
         assert words in capsys.readouterr().err

@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from rift_cl.basis.angular.environment import blunted
 from rift_cl.commands.cameras.fit_cameras import CAMERA_FILES, FitCameras, open_fit_cameras
 from rift_cl.commands.inputs.scene_bounds import bounds_of_splats
+from rift_cl.commands.run_folder.run_folder import job_of
 from rift_cl.commands.run_folder.saved_settings import read_settings
 from rift_cl.errors import FileFormatError, InputError
 from rift_cl.io.images.display_light import LightKind, to_display, to_linear
@@ -197,7 +198,11 @@ def scene_file(path: Path) -> Path:
     if not path.is_dir():
         return path
     if not (path / _SCENE).is_file():
-        raise InputError(f"{path}: holds no {_SCENE}; name a .ply, .spz or .splat file, or a fit")
+        job = job_of(path)
+        run = f"what 'rift {job}' made, and " if job else ""
+        raise InputError(
+            f"{path}: holds {run}no {_SCENE}; name a .ply, .spz or .splat file, or a fit"
+        )
     return path / _SCENE
 
 

@@ -328,6 +328,11 @@ def _record_of(path: Path) -> dict[str, Any]:
         return {}
 
 
+def job_of(path: Path) -> str:
+    """The command whose run a folder holds, such as "reconstruct"; empty where it holds none."""
+    return str(_record_of(path).get("job", ""))
+
+
 def is_unfinished(path: Path, job: str) -> bool:
     """Whether a folder holds a run of a command that did not come to its end."""
     record = _record_of(path)
