@@ -126,15 +126,15 @@ def fit(
         StoppedError: it was broken off by ``progress`` or by an interrupt.
         RiftError: a setting, the capture, the device or the folder cannot be used.
     """
+    from rift_cl.commands.fit.kind import is_scan
     from rift_cl.commands.fit_photos.job import Fit
     from rift_cl.commands.fit_photos.settings import FitPhotosSettings
     from rift_cl.commands.fit_xray.job import XrayFit
     from rift_cl.commands.fit_xray.settings import FitXraySettings
-    from rift_cl.io.scans.formats import is_scan_file
 
     if kind not in (None, "photos", "xray"):
         raise InputError(f"kind is {kind!r}, wanted 'photos' or 'xray'")
-    xray = is_scan_file(Path(capture)) if kind is None else kind == "xray"
+    xray = is_scan(Path(capture)) if kind is None else kind == "xray"
     with _folder(out, FitPhotosSettings, FitXraySettings) as (folder, keep):
         given = {"capture": capture, "out": folder, **settings}
         job: Fit | XrayFit
@@ -354,6 +354,7 @@ def _folder(out: PathLike | None, *settings: type) -> Iterator[tuple[Path, Calla
 
 @contextmanager
 def _own_or_temporary(out: PathLike | None) -> Iterator[tuple[Path, Callable[[R], R]]]:
+    """The folder, and what ties a temporary one to the record that is given back."""
     if out is not None:
         yield Path(out), lambda record: record
         return

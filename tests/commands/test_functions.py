@@ -48,6 +48,12 @@ def test_a_scan_file_is_fitted_as_x_rays(tmp_path):
     assert "held out, fit_error" in made._repr_html_()
 
 
+def test_cameras_of_another_program_are_no_scan(tmp_path):
+    np.savez(tmp_path / "cameras.npz", world_mat_0=np.eye(4), scale_mat_0=np.eye(4))
+    with pytest.raises(InputError, match="IDR"):
+        rift.fit(tmp_path / "cameras.npz", steps=5)
+
+
 def test_a_result_stands_for_its_folder(fitted, capture):
     scores = rift.evaluate(fitted)
     assert list(rift.evaluate(fitted, [capture]).scores) == [capture.name]

@@ -27,10 +27,10 @@ def kind_of_fit(arguments: Sequence[str]) -> Literal["photos", "xray"]:
     # What follows an option may be its value, so that the others are looked at first.
     words = [word for word in arguments if not word.startswith("-")]
     given = [word for word in words if _free(word, arguments)] or words
-    return "xray" if any(_is_scan(Path(word)) for word in given) else "photos"
+    return "xray" if any(is_scan(Path(word)) for word in given) else "photos"
 
 
-def _is_scan(path: Path) -> bool:
+def is_scan(path: Path) -> bool:
     """Whether a file is a scan, and not cameras that another program left in a file of its kind."""
     return is_scan_file(path) and other_program(path) is None
 

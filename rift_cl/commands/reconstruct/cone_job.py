@@ -22,7 +22,6 @@ from numpy.typing import NDArray
 from rift_cl import __version__
 from rift_cl.cl.budget import format_bytes
 from rift_cl.cl.device import Device
-from rift_cl.commands.inputs.detector_rows import dead_rows_words
 from rift_cl.commands.pictures.coverage_pictures import add_missed_planes
 from rift_cl.commands.pictures.slice_pictures import display_window
 from rift_cl.commands.reconstruct.assembly import Assembly, TakeSlab
@@ -43,7 +42,8 @@ from rift_cl.commands.reconstruct.report import (
     voxel,
 )
 from rift_cl.commands.reconstruct.settings import ReconstructSettings
-from rift_cl.commands.reconstruct.spread import Receipt, begun_workers, spread
+from rift_cl.commands.reconstruct.spread import begun_workers, spread
+from rift_cl.commands.reconstruct.tallied_run import TalliedRun
 from rift_cl.commands.reconstruct.volume import (
     chosen_window,
     clipped_words,
@@ -97,7 +97,7 @@ class ConeInversion:
     weights: dict[int, float] = dataclasses.field(default_factory=dict)
 
 
-class ConeReconstruction:
+class ConeReconstruction(TalliedRun):
     """A reconstruction of a cone-beam scan that is planned: nothing is read or written yet.
 
     Args:
@@ -115,8 +115,8 @@ class ConeReconstruction:
         settings.check()
         self.settings = settings
         self.device: Device = settings.open_device(settings.memory_limit)
-        self.source = ConeInput(settings, file, self.device)
-        self.inversion = ConeInversion(self.source.window)
+        self.source: ConeInput = ConeInput(settings, file, self.device)
+        self.inversion: ConeInversion = ConeInversion(self.source.window)
         # Made now, so that a scan that the method does not take is told before any work.
         self.projector, self._formula = self._operators()
         self._check_parts()
@@ -382,23 +382,6 @@ class ConeReconstruction:
         """Where it stands after so many slices."""
         return Report(done, self.shape[0], "slices", values or {})
 
-    def take(self, receipt: Receipt) -> None:
-        """Take what a worker tells of the slices that it made."""
-        self._count(**receipt.figures)
-        self.source.clean.zingers += receipt.zingers
-        self.inversion.residuals.update(receipt.residuals)
-        self.inversion.weights.update(receipt.weights)
-
-    def _mended(self, integrals: Attenuation) -> None:
-        """Count what was filled in rows that were read, and name those that are dead."""
-        self._count(dead_pixels=integrals.dead, starved_samples=integrals.starved)
-        if integrals.dead_rows:
-            self._say(dead_rows_words(integrals.dead_rows))
-
-    def _count(self, **found: int) -> None:
-        """Add to the figures of the run."""
-        self.metrics.update({name: self.metrics.get(name, 0) + n for name, n in found.items()})
-
     def _keep_what_is_done(self) -> bool:
         """After a failure: whether slices are kept; else the traces of slabs are removed."""
         if not self._in_slabs or self.settings.preview:
@@ -544,12 +527,6 @@ class ConeReconstruction:
         values, sentence = chosen_window(self.settings, few(), parts)
         self._say(sentence)
         return values
-
-    def _say(self, *sentences: str) -> None:
-        """Tell what became of the slices, now and in the report."""
-        self.source.notes.extend(sentences)
-        for sentence in sentences:
-            self.announce(sentence)
 
     def _open(
         self, settings: ReconstructSettings, values: tuple[float, float] | None

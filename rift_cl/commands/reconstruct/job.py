@@ -19,7 +19,6 @@ from numpy.typing import NDArray
 
 from rift_cl import __version__
 from rift_cl.cl.device import Device
-from rift_cl.commands.inputs.detector_rows import dead_rows_words
 from rift_cl.commands.reconstruct.assembly import Assembly, TakeSlab
 from rift_cl.commands.reconstruct.clean_rows import LoadedRows
 from rift_cl.commands.reconstruct.decided import decided_settings
@@ -41,7 +40,8 @@ from rift_cl.commands.reconstruct.report import (
 )
 from rift_cl.commands.reconstruct.settings import ReconstructSettings
 from rift_cl.commands.reconstruct.slice_input import SliceInput
-from rift_cl.commands.reconstruct.spread import Receipt, begun_workers, spread
+from rift_cl.commands.reconstruct.spread import begun_workers, spread
+from rift_cl.commands.reconstruct.tallied_run import TalliedRun
 from rift_cl.commands.reconstruct.volume import (
     check_place,
     chosen_window,
@@ -66,7 +66,7 @@ _FOUND = ("axis", "tilt of the axis", "angles", "volume")
 Floats = NDArray[np.float32]
 
 
-class Reconstruction:
+class Reconstruction(TalliedRun):
     """A reconstruction that is planned: the input is open, nothing is written yet.
 
     Args:
@@ -81,8 +81,8 @@ class Reconstruction:
         settings.check()
         self.settings = settings
         self.device: Device = settings.open_device(settings.memory_limit)
-        self.source = SliceInput(settings, self.device, file)
-        self.inversion = Inversion(settings, self.source, self.device)
+        self.source: SliceInput = SliceInput(settings, self.device, file)
+        self.inversion: Inversion = Inversion(settings, self.source, self.device)
         # Made now, so that a part that is not inside the slice is told before any work.
         self.kept = SlabFolder(settings.out / "slabs", self.shape)
         """The slices that are done."""
@@ -367,23 +367,6 @@ class Reconstruction:
                 return slices
             yield Report(done + report.done, self._total, self._what, report.values)
 
-    def take(self, receipt: Receipt) -> None:
-        """Take what a worker tells of the slices that it made."""
-        self._count(**receipt.figures)
-        self.source.clean.zingers += receipt.zingers
-        self.inversion.residuals.update(receipt.residuals)
-        self.inversion.weights.update(receipt.weights)
-
-    def _mended(self, integrals: Attenuation) -> None:
-        """Count what was filled in rows that were read, and name those that are dead."""
-        self._count(dead_pixels=integrals.dead, starved_samples=integrals.starved)
-        if integrals.dead_rows:
-            self._say(dead_rows_words(integrals.dead_rows))
-
-    def _count(self, **found: int) -> None:
-        """Add to the figures of the run."""
-        self.metrics.update({name: self.metrics.get(name, 0) + n for name, n in found.items()})
-
     def _finish(self, assembly: Assembly) -> None:
         """Make the report of the volume, which is there."""
         # Pictures want memory that the device keeps for arrays to come.
@@ -425,12 +408,6 @@ class Reconstruction:
         values, sentence = chosen_window(self.settings, images, parts)
         self._say(sentence)
         return values
-
-    def _say(self, *sentences: str) -> None:
-        """Tell what became of the slices, now and in the report."""
-        self.source.notes.extend(sentences)
-        for sentence in sentences:
-            self.announce(sentence)
 
     def _keep_what_is_done(self) -> bool:
         """After a failure: whether slices are kept; else the traces of the run are removed."""
