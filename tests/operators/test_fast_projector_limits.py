@@ -37,7 +37,6 @@ def test_any_budget_gives_the_same_bits(device, monkeypatch):
         A(x)
 
 
-@pytest.mark.full
 def test_scratch_is_what_is_taken(device):
     """No step may hold more than was counted beforehand."""
     A = FastProjector(Grid((200, 180)), Parallel(np.linspace(0, 3, 300), bins=280), device=device)
