@@ -4,6 +4,7 @@ Tools are for who works on the package and are no part of it: only ``pytest -m f
 """
 
 import importlib
+import os
 import runpy
 import sys
 from pathlib import Path
@@ -37,8 +38,14 @@ def ended(monkeypatch, capsys):
     return run
 
 
+def pytest_ignore_collect(config):
+    """Spare plain ``pytest`` what importing these tests takes; None asks the others."""
+    return True if config.selection == "plain" else None
+
+
 def pytest_collection_modifyitems(items):
     """Mark the tests of this folder."""
+    folder = f"{Path(__file__).parent}{os.sep}"
     for item in items:
-        if Path(__file__).parent in item.path.parents:
+        if str(item.path).startswith(folder):
             item.add_marker(pytest.mark.full)
