@@ -162,6 +162,22 @@ def test_preconditions_that_do_not_fit_are_refused(device, function):
             function(A, y, precondition=double)
 
 
+@pytest.mark.parametrize("signs", [[-1.0], [1.0, -3.0]], ids=["negative", "mixed"])
+def test_conjugate_gradients_name_a_preconditioner_that_is_not_positive(device, signs):
+    A = Matrix(np.random.default_rng(0).standard_normal((12, 8)), (8,), (12,), device)
+    F = Matrix(np.diag(np.resize(signs, 12)), (12,), (12,), device)
+    with pytest.raises(InputError, match="precondition is not positive"):
+        cgls(A, np.ones(12), 5, precondition=F)
+
+
+def test_conjugate_gradients_end_well_where_a_preconditioner_leaves_out_samples(device):
+    matrix = np.random.default_rng(0).standard_normal((12, 8))
+    kept, y = np.arange(12) < 5, np.ones(12)
+    A, F = Matrix(matrix, (8,), (12,), device), Matrix(np.diag(1.0 * kept), (12,), (12,), device)
+    found = cgls(A, y, 100, precondition=F)
+    assert found == pytest.approx(np.linalg.pinv(matrix[kept]) @ y[kept], abs=1e-4)
+
+
 def test_what_only_some_methods_take(device):
     A, _, _, y = problem(device)
     with pytest.raises(InputError, match="method is 'admm'"):

@@ -19,7 +19,7 @@ import numpy as np
 from rift_cl.cl.arithmetic import axpby
 from rift_cl.cl.elementwise import copy, multiply
 from rift_cl.cl.host_arrays import as_real_array
-from rift_cl.cl.reductions import dot
+from rift_cl.cl.reductions import dot, norm
 from rift_cl.errors import InputError, NonFiniteError, ShapeError
 from rift_cl.geometry.numbers import one_number
 from rift_cl.operators.linear import LinearOperator
@@ -106,6 +106,8 @@ class Cgls(Solver):
         curvature = dot(device, seen, weighted) + self._pull(now.direction)
         self._check(curvature, now.slope)
         unit = float(np.finfo(data.dtype).eps)
+        if curvature < 0:
+            self._check_positive(curvature, seen, weighted)
         if not (now.slope > 0 and curvature > 0 and now.slope**2 > unit**2 * now.loss * curvature):
             self._exhausted = True
             return
@@ -125,6 +127,23 @@ class Cgls(Solver):
         if not np.isfinite(values).all():
             raise NonFiniteError(
                 f"A' A y is beyond {self.data.dtype}: scale lengths, values and weights to near 1"
+            )
+
+    def _check_positive(self, curvature: float, seen: Any, weighted: Any) -> None:
+        """Refuse a preconditioner by which some residual counts less than nothing.
+
+        Rounding may leave a negative number too, where F leaves next to nothing of what is seen, or
+        where the step would lower the loss by no more than rounding: that is the end of a run.
+
+        Raises:
+            InputError: it is not positive definite.
+        """
+        now, device, unit = self._now, self.data.device, float(np.finfo(self.data.dtype).eps)
+        rounding = _ROUNDING * unit * norm(device, seen) * norm(device, weighted)
+        if curvature < -rounding and now.slope**2 > unit * abs(now.loss * curvature):
+            raise InputError(
+                "precondition is not positive definite: an image has a negative square in its "
+                "measure, so that there is no least one; wanted a self-adjoint positive operator"
             )
 
     def _turn(self) -> None:
@@ -209,7 +228,8 @@ def cgls(
         array of torch or JAX where that is one; no gradients pass.
 
     Raises:
-        InputError: an argument does not fit, is out of its range, or holds NaN or infinity.
+        InputError: an argument does not fit, is out of its range, or holds NaN or infinity; or
+            ``precondition`` turns out not to be positive.
         NonFiniteError: lengths, values or weights are so large that numbers do not fit the type.
     """
     solver = Cgls(
