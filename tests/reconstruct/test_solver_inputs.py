@@ -178,6 +178,13 @@ def test_conjugate_gradients_end_well_where_a_preconditioner_leaves_out_samples(
     assert found == pytest.approx(np.linalg.pinv(matrix[kept]) @ y[kept], abs=1e-4)
 
 
+@pytest.mark.parametrize("subsets", [1, 2])
+def test_sirt_that_diverges_names_the_cause(device, subsets):
+    A = Matrix(np.repeat([[3, -2.5], [-2.5, 3]], 2, axis=0), (2,), (4,), device)
+    with pytest.raises(InputError, match=r"SIRT diverges.*A has negative weights"):
+        sirt(A, np.array([1.0, 1.0, -1.0, -1.0]), 50, subsets=subsets)
+
+
 def test_what_only_some_methods_take(device):
     A, _, _, y = problem(device)
     with pytest.raises(InputError, match="method is 'admm'"):

@@ -31,7 +31,11 @@ from rift_cl.errors import InputError, NonFiniteError, checked_flag
 from rift_cl.geometry.numbers import one_number
 from rift_cl.operators.linear import LinearOperator
 from rift_cl.reconstruct.solvers.data_term import DataTerm
-from rift_cl.reconstruct.solvers.simultaneous_iteration import inverse_sums
+from rift_cl.reconstruct.solvers.simultaneous_iteration import (
+    check_converges,
+    inverse_sums,
+    residual_bound,
+)
 from rift_cl.reconstruct.solvers.solver import Solver, SolverState
 from rift_cl.reconstruct.solvers.view_subsets import Views, restricted, view_subsets
 
@@ -115,6 +119,7 @@ class OrderedSubsets(Solver):
         self._change = data.image()
         self._measured(image, self._now.residual)
         self._now.rms = data.rms(self._now.residual)
+        self._most = residual_bound(data, self._now.rms)
 
     def _subset(self, views: Views, whole: NDArray[Any], unweighted: bool) -> _Subset:
         data = self.data
@@ -156,6 +161,7 @@ class OrderedSubsets(Solver):
             )
         now.rms = math.sqrt(squares / data.samples)
         now.step += 1
+        check_converges(now, self._most, "A")
 
     def _look(self, part: _Subset, image: Any) -> None:
         part.A(image, out=part.residual)
