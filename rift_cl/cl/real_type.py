@@ -29,3 +29,19 @@ def real_type(device: Device, dtype: DTypeLike) -> np.dtype[Any]:
     if wanted == np.float64 and not device.traits.fp64:
         raise DeviceError(f"{device.name} cannot compute in float64 (no cl_khr_fp64): use float32")
     return wanted
+
+
+def working_type(dtype: DTypeLike, *, name: str) -> np.dtype[Any]:
+    """The type to work in for another package's operator: float64 for float64, else float32.
+
+    Args:
+        dtype: of the other operator's numbers.
+        name: what the caller calls that operator, for the error.
+
+    Raises:
+        DTypeError: its numbers are complex.
+    """
+    own = np.dtype(dtype)
+    if own.kind == "c":
+        raise DTypeError(f"{name} is of type {own}, wanted a real operator")
+    return np.dtype(np.float64 if own == np.float64 else np.float32)

@@ -23,6 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rift_cl.cl.device import Device
+from rift_cl.cl.real_type import working_type
 from rift_cl.errors import DTypeError, InputError, ShapeError
 from rift_cl.geometry import Grid
 from rift_cl.interop.optional_package import optional_package
@@ -112,7 +113,7 @@ def from_odl(P: Any, *, device: Device | None = None) -> LinearOperator:
         lambda y: P.adjoint(P.range.element(y)).asarray() * back,
         tuple(P.domain.shape),
         tuple(P.range.shape),
-        dtype=np.result_type(*(_dtype(space) for space in spaces)),
+        dtype=working_type(np.result_type(*map(_dtype, spaces)), name="P"),
         device=device,
     )
 

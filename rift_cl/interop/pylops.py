@@ -19,13 +19,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rift_cl.cl.device import Device
-from rift_cl.errors import DTypeError
+from rift_cl.cl.real_type import working_type
+from rift_cl.errors import DTypeError, ShapeError
 from rift_cl.interop.optional_package import optional_package
 from rift_cl.interop.scipy import aslinearoperator
 from rift_cl.operators.host_operator import HostOperator
 from rift_cl.operators.linear import LinearOperator
 
 __all__ = ["from_pylops", "to_pylops"]
+
+# In what NumPy says where SciPy and PyLops make a vector of their length of what a function gave.
+_LENGTH = "cannot reshape array of size"
 
 
 def to_pylops(A: LinearOperator) -> Any:
@@ -49,8 +53,12 @@ def from_pylops(P: Any, *, device: Device | None = None) -> LinearOperator:
             ``rmatvec``, a ``DTypeError`` says so when the adjoint is applied.
         device: whose arrays the result takes as well; the default one if not given.
 
+    Returns:
+        An operator in float64 where P is, and in float32 otherwise.
+
     Raises:
         DTypeError: P is no such operator, or complex.
+        ShapeError: P gave a vector of another length than its shape tells, when it was applied.
     """
     missing = [n for n in ("shape", "dtype", "matvec", "rmatvec") if not hasattr(P, n)]
     if missing:
@@ -60,19 +68,30 @@ def from_pylops(P: Any, *, device: Device | None = None) -> LinearOperator:
         )
     rows, columns = P.shape
     return HostOperator(
-        lambda x: P.matvec(x.ravel()),
-        lambda y: _adjoint(P, y.ravel()),
+        lambda x: _product(P, "matvec", x.ravel(), rows),
+        lambda y: _product(P, "rmatvec", y.ravel(), columns),
         _shape(P, "dims", columns),
         _shape(P, "dimsd", rows),
-        dtype=np.float32 if P.dtype is None else P.dtype,
+        dtype=working_type(np.float32 if P.dtype is None else P.dtype, name="P"),
         device=device,
     )
 
 
-def _adjoint(P: Any, y: NDArray[Any]) -> Any:
-    """``P' y``; SciPy tells of a function that it was not given only when it wants it."""
+def _product(P: Any, name: str, x: NDArray[Any], length: int) -> Any:
+    """``P x`` by ``matvec``, or ``P' x`` by ``rmatvec``, of so many numbers.
+
+    SciPy tells of a function that it was not given, and of one that gives another length, only when
+    it wants it.
+    """
     try:
-        return P.rmatvec(y)
+        return getattr(P, name)(x)
+    except ValueError as error:
+        if _LENGTH not in str(error) or f"({length},)" not in str(error):
+            raise
+        raise ShapeError(
+            f"{name} of P, a {type(P).__name__} of shape {P.shape}, does not give a vector of "
+            f"length {length} ({error})"
+        ) from error
     except NotImplementedError as error:
         raise DTypeError(
             f"P is a {type(P).__name__} without an adjoint ({error}), which A.T and solvers need: "

@@ -10,7 +10,7 @@ import scipy.sparse.linalg
 from scipy.sparse.linalg import aslinearoperator as scipy_operator
 
 import rift_cl as rift
-from rift_cl.errors import DTypeError, InputError
+from rift_cl.errors import DTypeError, InputError, ShapeError
 from rift_cl.interop.pylops import from_pylops, to_pylops
 from rift_cl.operators.host_operator import HostOperator
 
@@ -81,6 +81,24 @@ def test_an_operator_of_scipy_without_an_adjoint_says_so_when_it_is_wanted(devic
     assert np.array_equal(A(ones), 2 * ones)
     with pytest.raises(DTypeError, match=r"P is a .* without an adjoint.*rmatvec="):
         A.T(ones)
+
+
+@pytest.mark.parametrize("name", ["matvec", "rmatvec"])
+def test_a_function_that_gives_another_length_is_named(device, name):
+    functions = {
+        "matvec": lambda x: x.sum() * np.ones(5),
+        "rmatvec": lambda y: y.sum() * np.ones(4),
+    }
+    functions[name] = np.array
+    given = scipy.sparse.linalg.LinearOperator((5, 4), dtype=np.float32, **functions)
+    A, length = from_pylops(given, device=device), {"matvec": 5, "rmatvec": 4}[name]
+    with pytest.raises(ShapeError, match=rf"{name} of P.*\(5, 4\).*length {length}"):
+        A(np.ones(4)) if name == "matvec" else A.T(np.ones(5))
+
+
+def test_an_operator_of_whole_numbers_works_in_float32(device):
+    given = scipy_operator(np.array([[1, 2], [3, 4]], np.int8))
+    assert from_pylops(given, device=device).dtype == np.float32
 
 
 def test_a_wrong_adjoint_is_found_by_the_dot_test(device):
