@@ -18,7 +18,7 @@ from rift_cl.cl.device import Device
 from rift_cl.cl.discovery import default_device
 from rift_cl.cl.elementwise import copy
 from rift_cl.cl.host_arrays import as_host_array, download, upload
-from rift_cl.errors import DTypeError, InputError, ShapeError
+from rift_cl.errors import InputError, ShapeError
 from rift_cl.operators.linear import LinearOperator, Shape
 
 # In what NumPy says to who writes into an array that may only be read.
@@ -40,7 +40,7 @@ class HostOperator(LinearOperator):
         device: whose arrays it takes as well; the default one if not given.
 
     Raises:
-        DTypeError: ``dtype`` is complex.
+        DTypeError: ``dtype`` is neither of the two.
         ShapeError: ``domain`` or ``range`` is no shape, or a function gave another shape, when it
             was applied.
         InputError: a function wrote into its argument, when it was applied.
@@ -56,11 +56,8 @@ class HostOperator(LinearOperator):
         dtype: DTypeLike = np.float32,
         device: Device | None = None,
     ) -> None:
-        if np.dtype(dtype).kind == "c":
-            raise DTypeError(f"the operator is of type {np.dtype(dtype)}, wanted a real one")
-        real = np.float64 if np.dtype(dtype) == np.float64 else np.float32
         shapes = (_shape("domain", domain), _shape("range", range))
-        super().__init__(*shapes, device or default_device(), real)
+        super().__init__(*shapes, device or default_device(), dtype)
         self._forward, self._backward = forward, adjoint
 
     def __reduce__(self) -> tuple[Any, ...]:

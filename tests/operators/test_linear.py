@@ -473,6 +473,12 @@ def test_a_host_operator_wants_shapes(device):
             rift.HostOperator(np.array, np.array, *shapes, device=device)
 
 
+@pytest.mark.parametrize("dtype", ["f2", "i8", "c8"])
+def test_a_host_operator_works_in_the_type_that_it_is_told_or_in_none(device, dtype):
+    with pytest.raises(DTypeError, match=f"dtype is '{dtype}'"):
+        rift.HostOperator(np.array, np.array, (8,), (8,), dtype=dtype, device=device)
+
+
 def test_a_result_that_the_host_has_no_memory_for_is_refused():
     A = rift.Projector(rift.Grid((8, 8)), rift.Parallel(np.arange(1 << 19) * 1e-5, 2**31))
     with pytest.raises(ResourceLimitError, match=r"result of shape .* which the host has not"):
