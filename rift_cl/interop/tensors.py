@@ -41,10 +41,12 @@ def check_tensor(
     if not isinstance(value, torch.Tensor):
         raise DTypeError(f"{name} is a {type(value).__name__}, wanted a torch tensor")
     if value.dtype != dtype or value.layout != torch.strided:
-        call = ".double()" if dtype == torch.float64 else ".float()"
+        calls = [".to_dense()"] if value.layout != torch.strided else []
+        if value.dtype != dtype:
+            calls.append(".double()" if dtype == torch.float64 else ".float()")
         raise DTypeError(
             f"{name} is a {value.layout} tensor of {value.dtype}, wanted a dense {dtype}: "
-            f"call .to_dense() or {call}"
+            f"call {' and '.join(calls)}"
         )
     fits = len(value.shape) == len(shape) and all(
         wanted in (None, length) for length, wanted in zip(value.shape, shape, strict=True)

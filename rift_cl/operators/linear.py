@@ -225,17 +225,23 @@ class LinearOperator(ABC):
 
         Raises:
             InputError: the factor is no finite real number: an array, to which the operator was
-                probably meant to be applied, another operator, or a complex number.
+                probably meant to be applied, another operator, a complex number, or a number of
+                torch or JAX, whose gradient an operator does not pass on.
         """
         from rift_cl.operators.algebra import Scaled
 
-        if isinstance(factor, np.ndarray) and factor.ndim == 0:
-            factor = factor[()]
+        factor = _number_of(factor)
         if isinstance(factor, (int, float, np.integer, np.floating)):
             return Scaled(self, float(factor))
         if isinstance(factor, LinearOperator):
             raise InputError(
                 "A * B of two operators is not defined: write A @ B to apply B, then A"
+            )
+        if (is_tensor(factor) or is_jax_array(factor)) and not factor.shape:
+            raise InputError(
+                f"an operator can be multiplied by a number of Python only, and was given a "
+                f"{type(factor).__name__}: write float(factor) * A where no gradient is to pass "
+                "to the factor, or factor * A(x), through which one passes"
             )
         if hasattr(factor, "shape") or isinstance(factor, (list, tuple)):
             raise InputError(
@@ -254,6 +260,7 @@ class LinearOperator(ABC):
         Raises:
             InputError: the divisor is 0, or no finite real number.
         """
+        divisor = _number_of(divisor)
         if isinstance(divisor, (int, float, np.integer, np.floating)) and divisor == 0:
             raise InputError("an operator cannot be divided by 0")
         if isinstance(divisor, (int, float, np.integer, np.floating)):
@@ -359,6 +366,11 @@ class LinearOperator(ABC):
     @abstractmethod
     def _apply_adjoint(self, y: DeviceArray, out: DeviceArray) -> None:
         """Write A' y to ``out``; device arrays with the shapes of a chunk."""
+
+
+def _number_of(value: Any) -> Any:
+    """The number that a NumPy array without axes holds; anything else as it is."""
+    return value[()] if isinstance(value, np.ndarray) and value.ndim == 0 else value
 
 
 def _empty(shape: Shape, dtype: np.dtype[Any]) -> NDArray[Any]:

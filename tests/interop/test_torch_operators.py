@@ -186,10 +186,10 @@ BAD = {
     "array": (lambda x: x.numpy(), DTypeError, "x is a ndarray, wanted a torch tensor"),
     "list": (lambda x: x.tolist(), DTypeError, "x is a list"),
     "double": (lambda x: x.double(), DTypeError, r"float64.*float32.*\.float\(\)"),
-    "half": (lambda x: x.half(), DTypeError, "float16"),
+    "half": (lambda x: x.half(), DTypeError, r"float16.*: call \.float\(\)$"),
     "whole numbers": (lambda x: x.int(), DTypeError, "int32"),
     "complex": (lambda x: x + 1j, DTypeError, "complex64"),
-    "sparse": (lambda x: x.to_sparse(), DTypeError, "sparse"),
+    "sparse": (lambda x: x.to_sparse(), DTypeError, r"sparse.*: call \.to_dense\(\)$"),
     "elsewhere": (lambda x: x.to("meta"), DeviceError, "meta"),
     "transposed": (lambda x: x.T, ShapeError, r"shape \(7, 6\), wanted \(6, 7"),
     "too flat": (lambda x: x[0], ShapeError, r"shape \(7,\)"),
@@ -203,6 +203,15 @@ def test_what_is_no_argument_is_named(device, case):
     change, error, words = BAD[case]
     with pytest.raises(error, match=words):
         apply(projector(device), change(white(6, 7)))
+
+
+def test_a_tensor_is_no_factor_of_an_operator_but_of_its_result(device):
+    A, two = projector(device), torch.tensor(2.0, requires_grad=True)
+    for product in (lambda: A * two, lambda: two * A):
+        with pytest.raises(InputError, match=r"number of Python.*factor \* A\(x\)"):
+            product()
+    (two * A(white(6, 7))).sum().backward()
+    assert two.grad is not None
 
 
 def test_what_is_no_operator_is_named():

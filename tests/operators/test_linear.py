@@ -297,6 +297,8 @@ def test_a_product_with_an_array_is_refused(A, device):
     with pytest.raises(InputError, match="1j"):
         A * 1j
     assert np.array_equal(A @ X, A(X))
+    assert np.array_equal((A * np.array(2.0))(X), (2 * A)(X))
+    assert np.array_equal((A / np.array(2.0))(X), (0.5 * A)(X))
 
 
 def test_algebra(A, F):
