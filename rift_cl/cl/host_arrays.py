@@ -23,6 +23,8 @@ if TYPE_CHECKING:
     from rift_cl.cl.device import Device
 
 _BLOCK = 1 << 20
+# The axes of arrays here, in their order, by the names that they have where axes have names.
+NAMED_AXES = (("z", "y", "x"), ("theta", "row", "detector"))
 # Devices of the DLPack standard whose memory the host does not read, by their numbers.
 _ELSEWHERE = {
     2: "CUDA",
@@ -84,11 +86,18 @@ def as_real_array(values: Any, *, name: str) -> NDArray[Any]:
     Arrays of other packages are read by ``__array__`` or, where they have none, by DLPack.
 
     Raises:
-        DTypeError: the values are not real numbers.
+        DTypeError: the values are not real numbers, or a tensor that keeps gradients.
+        ShapeError: their axes have names, those of ``NAMED_AXES``, and are in another order.
         DeviceError: they are on a device whose memory the host does not read.
     """
     if isinstance(values, np.ma.MaskedArray):
         raise DTypeError(f"{name} is a masked array: fill the masked values first")
+    if is_tensor(values) and getattr(values, "requires_grad", False):
+        raise DTypeError(
+            f"{name} is a tensor with requires_grad, and no gradients pass through what it is "
+            f"given to: give {name}.detach()"
+        )
+    _check_order(values, name=name)
     try:
         array = np.from_dlpack(values) if _dlpack_alone(values) else np.asarray(values)
     except (TypeError, ValueError, RuntimeError, BufferError) as error:
@@ -98,6 +107,20 @@ def as_real_array(values: Any, *, name: str) -> NDArray[Any]:
     if array.dtype.kind not in "fiub":
         raise DTypeError(f"{name} has type {array.dtype}, wanted real numbers (float32)")
     return array
+
+
+def _check_order(values: Any, *, name: str) -> None:
+    """Refuse an xarray.DataArray with the axes of an image or a scan in another order than ours."""
+    if not (hasattr(values, "dims") and hasattr(values, "coords")):
+        return
+    given = tuple(values.dims)
+    for axes in NAMED_AXES:
+        wanted = tuple(axis for axis in axes if axis in given)
+        if set(wanted) == set(given) and wanted != given:
+            raise ShapeError(
+                f"{name} has the dimensions {', '.join(given)}, wanted {', '.join(wanted)}: "
+                f"give {name}.transpose{wanted}"
+            )
 
 
 def _dlpack_alone(values: Any) -> bool:

@@ -20,7 +20,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from rift_cl.cl.host_arrays import as_host_array, as_real_array
+from rift_cl.cl.host_arrays import NAMED_AXES, as_host_array, as_real_array
 from rift_cl.errors import DTypeError, InputError, ShapeError
 from rift_cl.geometry import Cone, Fan, Grid, Parallel
 from rift_cl.geometry.length_units import length_unit
@@ -113,7 +113,7 @@ def from_xarray(array: Any) -> tuple[Floats, Labelled]:
     if not all(hasattr(array, name) for name in ("dims", "coords", "attrs", "transpose")):
         raise DTypeError(f"array is a {type(array).__name__}, wanted an xarray.DataArray")
     names, scan = set(map(str, array.dims)), "theta" in array.dims
-    wanted = ("theta", "row", "detector") if scan else ("z", "y", "x")
+    wanted = NAMED_AXES[scan]
     order = [axis for axis in wanted if axis in names]
     if len(order) != len(names) or not {*wanted} - {wanted[1 if scan else 0]} <= names:
         raise ShapeError(

@@ -62,6 +62,12 @@ def exact(device):
     return rift.Projector(rift.Grid((3, 4)), scan, device=device, dtype="float64")
 
 
+def test_a_solver_says_that_no_gradients_pass_through_it(device):
+    A = projector(device)
+    with pytest.raises(DTypeError, match=r"y is a tensor with requires_grad.*y\.detach\(\)"):
+        rift.cgls(A, torch.zeros(A.range, requires_grad=True), steps=2)
+
+
 def test_the_values_are_the_operators_own(device):
     A, x = projector(device), white(6, 7)
     assert np.array_equal(apply(A, x).numpy(), A(x.numpy()))

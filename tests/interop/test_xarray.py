@@ -206,3 +206,21 @@ def test_what_cannot_be_labelled_is_named():
         to_xarray(values_of((3, 6)), THINGS["slice"][0])
     with pytest.raises(DTypeError, match="of is a int, wanted a Grid"):
         to_xarray(values_of((3, 6)), 3)
+
+
+def test_an_operator_takes_named_axes_in_its_own_order_alone(device):
+    grid, scan = rift.Grid((6, 6)), rift.Parallel(ANGLES, 5)
+    A, image, sinogram = (
+        rift.Projector(grid, scan, device=device),
+        values_of((6, 6)),
+        values_of((5, 5)),
+    )
+    labelled, views = to_xarray(image, grid), to_xarray(sinogram, scan)
+    assert np.array_equal(A(labelled), A(image))
+    with pytest.raises(ShapeError, match=r"dimensions x, y, .*\.transpose\('y', 'x'\)"):
+        A(labelled.transpose("x", "y"))
+    for solve in (rift.fbp, rift.cgls):
+        with pytest.raises(ShapeError, match=r"\.transpose\('theta', 'detector'\)"):
+            solve(A, views.transpose("detector", "theta"))
+    turned = labelled.transpose("x", "y").rename(x="u", y="v")
+    assert np.array_equal(A(turned), A(image.T))
