@@ -7,9 +7,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import torch
-from torch.autograd.function import once_differentiable
 
 from rift_cl.cl.device import Device
+from rift_cl.interop.one_derivative import apply, one_derivative
 from rift_cl.interop.splat_functions import Drawer
 from rift_cl.interop.tensors import to_device, to_tensor
 from rift_cl.splat.bands import FrameMemory
@@ -64,7 +64,7 @@ class Rasterize(torch.autograd.Function):
         return (torch.stack(images), 1 - torch.stack(thin)[..., None], *lists)
 
     @staticmethod
-    @once_differentiable
+    @one_derivative
     def backward(ctx: Any, *incoming: Any) -> tuple[Any, ...]:
         """Gradients by all that was drawn; positions gain ``absgrad`` where that is asked for."""
         device, (means2d, conics, weights) = ctx.how.device, ctx.saved_tensors
@@ -125,6 +125,5 @@ def rasterize_flat(
     how: Drawer, parts: Parts, *tensors: torch.Tensor | None
 ) -> tuple[torch.Tensor, torch.Tensor, torch.Tensor, torch.Tensor, torch.Tensor]:
     """What ``Rasterize`` gives, with types."""
-    drawn: Any = Rasterize.apply(how, parts, *tensors)  # type: ignore[no-untyped-call]
-    images, alphas, tiles, entries, starts = drawn
+    images, alphas, tiles, entries, starts = apply(Rasterize, how, parts, *tensors)
     return images, alphas, tiles, entries, starts

@@ -14,12 +14,12 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import torch
-from torch.autograd.function import once_differentiable
 
 from rift_cl.cl.arithmetic import sum_columns
 from rift_cl.cl.device import Device
 from rift_cl.geometry import Camera
 from rift_cl.geometry.camera import CameraModel
+from rift_cl.interop.one_derivative import one_derivative
 from rift_cl.interop.tensors import to_device, to_host, to_tensor
 from rift_cl.splat.features import shade, shade_grad
 from rift_cl.splat.projection import SplatGradients, project, project_grad
@@ -76,7 +76,7 @@ class Project(torch.autograd.Function):
         return means2d, conics, weights, depths, extents, *rest[1:]
 
     @staticmethod
-    @once_differentiable
+    @one_derivative
     def backward(ctx: Any, *incoming: Any) -> tuple[Any, ...]:
         """Gradients by everything that was projected, summed over the views."""
         means2d, conics, weights, depths = incoming[:4]
@@ -121,7 +121,7 @@ class Shade(torch.autograd.Function):
         return out
 
     @staticmethod
-    @once_differentiable
+    @one_derivative
     def backward(ctx: Any, *incoming: Any) -> tuple[Any, ...]:
         """Gradients by means, coefficients and view matrices."""
         means, sh, out = ctx.saved_tensors

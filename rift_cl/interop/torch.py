@@ -20,6 +20,7 @@ from rift_cl.cl.device import Device
 from rift_cl.cl.discovery import default_device
 from rift_cl.errors import InputError, ShapeError
 from rift_cl.geometry.camera import CameraModel, image_size
+from rift_cl.interop.one_derivative import apply
 from rift_cl.interop.raster_function import Parts, rasterize_flat
 from rift_cl.interop.splat_functions import Drawer, Project, Shade
 from rift_cl.interop.tensors import check_tensor
@@ -99,8 +100,7 @@ def project(
     if viewmats.shape[0] == 0:
         raise ShapeError("viewmats has shape (0, 4, 4), wanted one view or more")
     tensors = (means, quats, scales, covars, opacities, viewmats, Ks)
-    screens: Any = Project.apply(how, *tensors)  # type: ignore[no-untyped-call]
-    return Screens(*screens)
+    return Screens(*apply(Project, how, *tensors))
 
 
 def shade(
@@ -119,7 +119,7 @@ def shade(
     if sh.shape[-2] not in (1, 4, 9, 16, 25):
         raise ShapeError(f"sh has {sh.shape[-2]} coefficients, wanted 1, 4, 9, 16 or 25")
     tensors = (means, sh, viewmats, Ks, culled)
-    colors: torch.Tensor = Shade.apply(how, *tensors)  # type: ignore[no-untyped-call]
+    colors: torch.Tensor = apply(Shade, how, *tensors)
     return colors
 
 

@@ -7,6 +7,7 @@ import pytest
 from projection_scenes import camera_of, random_splats
 
 import rift_cl as rift
+from rift_cl.errors import InputError
 from rift_cl.splat.settings import SplatSettings
 from rift_cl.splat.splats import Splats
 
@@ -243,9 +244,25 @@ def test_no_splats_and_one_pixel(device):
     assert leaves["means"].grad.shape == (0, 3)
 
 
-def test_second_derivatives_are_refused(device):
+@pytest.mark.parametrize("power", [1, 2])
+def test_a_gradient_has_no_derivative_whatever_the_loss(device, power):
     tensors, (views, Ks) = tensors_of(scene(), grad=True), map(torch.tensor, cameras())
     images, _ = render(tensors, views, Ks, device=device)
-    (first,) = torch.autograd.grad((images**2).sum(), tensors["means"], create_graph=True)
-    with pytest.raises(RuntimeError, match="once_differentiable"):
-        first.sum().backward()
+    loss = (images**power).sum()
+    plain = torch.autograd.grad(loss, list(tensors.values()), retain_graph=True)
+    found = torch.autograd.grad(loss, list(tensors.values()), create_graph=True)
+    assert all(map(torch.equal, plain, found))
+    for gradient in found:
+        with pytest.raises(InputError, match="differentiated again"):
+            (loss + (gradient**2).sum()).backward(retain_graph=True)
+
+
+def test_a_transform_of_torch_func_is_told_what_to_take(device):
+    tensors, (views, Ks) = tensors_of(scene()), map(torch.tensor, cameras())
+
+    def loss(means):
+        return render(tensors | {"means": means}, views, Ks, device=device)[0].sum()
+
+    for transform in (torch.func.grad, torch.func.jacrev, torch.vmap):
+        with pytest.raises(InputError, match=r"torch\.func.*backward"):
+            transform(loss)(tensors["means"][None] if transform is torch.vmap else tensors["means"])
