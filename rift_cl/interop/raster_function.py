@@ -50,9 +50,7 @@ class Rasterize(torch.autograd.Function):
         screen = torch.cat([means2d, conics, weights[:, None], extents], dim=1)
         ctx.how, ctx.parts, ctx.passes = how, parts, []
         for view, rows in enumerate(_runs(parts.counts)):
-            # X-rays have nothing behind them.
-            lit = backgrounds is not None and how.settings.mode == "light"
-            behind = to_device(how.device, backgrounds[view]) if lit else None
+            behind = None if backgrounds is None else to_device(how.device, backgrounds[view])
             arrays = [to_device(how.device, t[rows]) for t in (screen, depths, boxes, features)]
             ctx.passes.append(_draw(how, arrays, behind))
         ctx.save_for_backward(means2d, conics, weights)

@@ -12,18 +12,20 @@ which keeps everything on the device.
 
 from __future__ import annotations
 
+import math
 from typing import Any, NamedTuple
 
 import torch
 
 from rift_cl.cl.device import Device
 from rift_cl.cl.discovery import default_device
+from rift_cl.cl.host_arrays import check_finite
 from rift_cl.errors import InputError, ShapeError
 from rift_cl.geometry.camera import CameraModel, image_size
 from rift_cl.interop.one_derivative import apply
 from rift_cl.interop.raster_function import Parts, rasterize_flat
 from rift_cl.interop.splat_functions import Drawer, Project, Shade
-from rift_cl.interop.tensors import check_tensor
+from rift_cl.interop.tensors import check_tensor, to_host
 from rift_cl.splat.renderer import DepthKind, check_depth
 from rift_cl.splat.settings import SplatSettings
 from rift_cl.splat.splats import check_opacities, check_scales
@@ -130,6 +132,10 @@ def rasterize(
     backgrounds: torch.Tensor | None = None,
 ) -> tuple[torch.Tensor, torch.Tensor]:
     """Draw (V, N, D) features: images (V, height, width, D) and alphas (V, height, width, 1)."""
+    if backgrounds is not None and how.settings.mode == "xray":
+        raise InputError(
+            "backgrounds have no meaning in xray mode, in which nothing lies behind: leave them out"
+        )
     views, count = screens.culled.shape
     check_tensor("features", features, (views, count, None), screens.means2d)
     if backgrounds is not None:
@@ -142,17 +148,23 @@ def rasterize(
     return images, alphas
 
 
-def _check_stored(
-    scales: torch.Tensor | None, opacities: torch.Tensor, settings: SplatSettings
-) -> None:
-    """Refuse scales and opacities in the form that files hold, which would draw nothing."""
-    if not len(opacities):
-        return
-    if scales is not None:
-        check_scales(float(scales.detach().amin()))
-    if settings.mode == "light" and settings.activation == "clamp":
-        least, most = torch.aminmax(opacities.detach())
-        check_opacities(float(least), float(most))
+def _check_values(given: dict[str, torch.Tensor | None], settings: SplatSettings) -> None:
+    """Refuse what would leave out splats without a word, as a fit that diverges has them.
+
+    Raises:
+        NonFiniteError: a tensor holds NaN or infinity.
+        InputError: scales or opacities are in the form that files hold, or densities below 0.
+    """
+    for name, tensor in given.items():
+        if tensor is None or not tensor.numel():
+            continue
+        least, most = map(float, torch.aminmax(tensor.detach()))
+        if not math.isfinite(most - least):
+            check_finite(to_host(tensor), name=name)
+        if name == "scales":
+            check_scales(least)
+        if name == "opacities":
+            check_opacities(least, most, settings)
 
 
 def render(
@@ -181,23 +193,26 @@ def render(
         scales: (N, 3) standard deviations, not their logarithms; a splat with a scale of 0 is not
             drawn and gets no gradient; None with ``covars``.
         opacities: (N,) opacities, 0 to 1 and not their logits, or densities in xray mode and
-            optical depths with the activations ``exp`` and ``square``.
+            optical depths with the activations ``exp`` and ``square``. A splat of density 0 is not
+            drawn and gets no gradient, so that a fit has to begin above 0.
         viewmats: (V, 4, 4) world-to-camera matrices.
         Ks: (V, 3, 3) intrinsics in pixels.
         size: (height, width) of the images.
         sh: (N, K, 3) spherical harmonics.
         colors: (N, D) features; drawn after the harmonics' three colours if both are given.
         covars: (N, 6) upper triangles of covariances, in place of ``quats`` and ``scales``.
-        backgrounds: (V, D) for all channels but depth; black if not given.
+        backgrounds: (V, D) for all channels but depth; black if not given; not in xray mode.
         depth: draw depth as the last channel, ``accumulated`` or ``expected``.
         model: of the cameras.
         settings: of the rasterizer.
         device: the OpenCL device; the default one if not given.
 
     Returns:
-        Images (V, height, width, D) and alphas (V, height, width, 1).
+        Images (V, height, width, D) and alphas (V, height, width, 1), which are 0 in xray mode. A
+        gradient through them has no derivative: ``create_graph`` gives one that refuses it.
 
     Raises:
+        NonFiniteError: a tensor holds NaN or infinity, of which a splat would not be drawn.
         RiftError: of the kind and with the sentence that say what does not fit.
     """
     how = drawer(size, model=model, settings=settings, device=device)
@@ -205,7 +220,6 @@ def render(
     if depth == "median":
         raise InputError("the median depth has no gradient: rift_cl.splat.Renderer draws it")
     screens = project(how, means, quats, scales, opacities, viewmats, Ks, covars=covars)
-    _check_stored(scales, opacities, how.settings)
     views, count = screens.culled.shape
     parts = []
     if sh is not None:
@@ -213,6 +227,9 @@ def render(
     if colors is not None:
         check_tensor("colors", colors, (count, None), means)
         parts.append(colors.expand(views, count, -1))
+    given = {"means": means, "quats": quats, "scales": scales, "covars": covars}
+    given |= {"opacities": opacities, "sh": sh, "colors": colors}
+    _check_values(given, how.settings)
     if depth is not None:
         parts.append(screens.depths[..., None])
         backgrounds = with_depth(backgrounds)

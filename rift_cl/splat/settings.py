@@ -49,7 +49,7 @@ class SplatSettings:
     """Dim splats as eps2d widens them (Mip-Splatting)."""
     mode: NoOption[SplatMode] = "light"
     """``light`` composites front to back; ``xray`` adds line integrals, with opacities as densities
-    whose mass ``eps2d`` does not change."""
+    whose mass ``eps2d`` does not change; those of 0 and below are not drawn."""
     absgrad: NoOption[bool] = False
     """Sum magnitudes of screen-position gradients as well, for densification."""
     smooth_cutoff: NoOption[bool] = False

@@ -23,6 +23,7 @@ from rift_cl.cl.host_arrays import as_plain, as_real_array, upload
 from rift_cl.errors import DTypeError, InputError, ShapeError, WrongTypeError
 from rift_cl.splat.orders import count_of, order_of
 from rift_cl.splat.rounded_places import check_rounding, distances_moved
+from rift_cl.splat.settings import SplatSettings
 
 # Numbers of spherical harmonics of degree 0 to 4.
 _COEFFICIENTS = (1, 4, 9, 16, 25)
@@ -41,6 +42,7 @@ class Splats:
             drawn; None with ``covars``.
         opacities: (N,) opacities, 0 to 1; densities at the peak, per length, in xray mode. What
             they are belongs to the settings they are drawn with, so that they are not checked here.
+            A splat of density 0 or below is not drawn and gets no gradient.
         colors: (N, D) features, or None.
         sh: (N, K, 3) coefficients of spherical harmonics, K = 1, 4, 9, 16 or 25, or None.
         covars: (N, 6) upper triangles xx, xy, xz, yy, yz, zz of covariance matrices, in place
@@ -181,13 +183,24 @@ def check_scales(least: float) -> None:
         )
 
 
-def check_opacities(least: float, most: float) -> None:
-    """Refuse the logits of opacities, which files of splats hold.
+def check_opacities(least: float, most: float, settings: SplatSettings) -> None:
+    """Refuse opacities that are none, such as logits, which files of splats hold.
+
+    Args:
+        least: of the opacities.
+        most: of them.
+        settings: by which they are drawn.
 
     Raises:
-        InputError: an opacity is below 0 or above 1.
+        InputError: an opacity is below 0 or above 1, or a density of xray mode below 0.
     """
-    if least < 0 or most > 1:
+    if settings.mode == "xray":
+        if least < 0:
+            raise InputError(
+                f"opacities, which are densities in xray mode, go down to {least:.3g}, and none "
+                "below 0 is drawn: fit their logarithms, and draw exp of these"
+            )
+    elif settings.activation == "clamp" and (least < 0 or most > 1):
         raise InputError(
             f"opacities go from {least:.3g} to {most:.3g}, wanted 0 to 1: of their logits take "
             "sigmoid(opacities), 1 / (1 + exp(-opacities))"

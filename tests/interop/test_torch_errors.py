@@ -30,6 +30,8 @@ BAD = {
     "negative": ({"scales": lambda t: -t}, InputError, r"scales go down to.*exp"),
     "logits": ({"opacities": lambda t: t.logit()}, InputError, r"opacities go from.*sigmoid"),
     "above 1": ({"opacities": lambda t: t + 1}, InputError, r"opacities go from.*sigmoid"),
+    "NaN": ({"means": lambda t: t * float("nan")}, NonFiniteError, "means holds NaN"),
+    "infinity": ({"sh": lambda t: t / 0}, NonFiniteError, "sh holds NaN or infinity"),
     "lenses": ({"Ks": lambda t: t[:1]}, ShapeError, r"Ks has shape \(1, 3, 3\)"),
 }
 
@@ -72,6 +74,15 @@ def test_whole_numbers_of_any_type_are_a_size(device):
     tensors, (views, Ks) = tensors_of(scene()), map(torch.tensor, cameras())
     images = [render(tensors, views, Ks, size=size, device=device)[0] for size in SIZES]
     assert all(torch.equal(image, images[0]) for image in images[1:])
+
+
+def test_what_has_no_meaning_in_xray_mode_is_refused(device):
+    tensors, (views, Ks) = tensors_of(scene()), map(torch.tensor, cameras())
+    given = {"settings": SplatSettings(mode="xray"), "device": device}
+    with pytest.raises(InputError, match=r"backgrounds.*xray"):
+        render(tensors, views, Ks, backgrounds=torch.zeros(2, 3), **given)
+    with pytest.raises(InputError, match=r"densities in xray mode, go down to -0\.5"):
+        render(tensors | {"opacities": tensors["opacities"] * 0 - 0.5}, views, Ks, **given)
 
 
 @pytest.mark.parametrize(
