@@ -22,6 +22,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rift_cl.cl.device import Device
+from rift_cl.cl.host_arrays import as_host_array
 from rift_cl.errors import DTypeError, InputError, ShapeError
 from rift_cl.geometry import Camera
 from rift_cl.interop.batches import apply_to_each
@@ -29,7 +30,7 @@ from rift_cl.interop.optional_package import optional_package
 from rift_cl.operators.linear import LinearOperator
 from rift_cl.splat.renderer import Frame, Renderer
 from rift_cl.splat.settings import SplatSettings
-from rift_cl.splat.splats import Splats
+from rift_cl.splat.splats import Splats, check_opacities, check_scales
 
 __all__ = ["apply", "render"]
 
@@ -82,17 +83,24 @@ def render(
     Args:
         splats: float32 arrays by name, as in ``rift_cl.Splats``: means (N, 3), opacities (N,),
             quats (N, 4) and scales (N, 3), or covars (N, 6); sh (N, K, 3), colors (N, D) or both.
+            Densities of xray mode are 0 or more; a splat of density 0 is not drawn and gets no
+            gradient, so that a fit has to begin above 0.
         camera: whose image is drawn; gradients do not go to it.
-        background: (D,) colour behind the splats; black if not given.
+        background: (D,) colour behind the splats, no tracer; black if not given; not in xray mode.
         settings: of the rasterizer.
         device: the OpenCL device; the default one if not given.
 
     Returns:
-        The image (height, width, D) and alpha (height, width, 1), through which gradients pass to
-        all that is in ``splats``.
+        The image (height, width, D) and alpha (height, width, 1), which is 0 in xray mode, through
+        which gradients pass to all that is in ``splats``. Where a number of these is not finite
+        all of both is NaN, and so are the gradients.
 
     Raises:
-        RiftError: of the kind and with the sentence that say what does not fit.
+        RiftError: of the kind and with the sentence that say what does not fit: shapes and types
+            always, scales and opacities out of their range where their values are known. Those of
+            a tracer, under ``jit`` or ``grad``, are known when the compiled function runs, and JAX
+            makes a ``jax.errors.JaxRuntimeError`` of the error, with that sentence in it; so
+            it does where the device has no memory.
     """
     jax = optional_package("jax", what="rift_cl.interop.jax")
     unknown = [name for name in splats if name not in _PARAMETERS]
@@ -108,7 +116,10 @@ def render(
     if "sh" not in given and "colors" not in given:
         raise InputError("nothing is drawn: give sh or colors")
     channels = (3 if "sh" in given else 0) + (given["colors"].shape[1] if "colors" in given else 0)
-    drawing = _Drawing(Renderer(settings, device=device), camera, channels, background)
+    renderer = Renderer(settings, device=device)
+    known = {name: v for name, v in given.items() if not isinstance(v, jax.core.Tracer)}
+    _check_ranges(_hosts(known), renderer.settings)
+    drawing = _Drawing(renderer, camera, channels, background)
     image, alpha = drawing.function(jax)(given)
     return image, alpha
 
@@ -149,8 +160,12 @@ class _Drawing:
     ) -> None:
         self._renderer, self._camera = renderer, camera
         self._shape = (*camera.size, channels)
-        device = renderer.device
-        self._behind = None if background is None else device.array(background, np.float32)
+        self._behind = None
+        if background is not None:
+            if renderer.settings.mode == "xray":
+                raise InputError("background has no meaning in xray mode: leave it out")
+            behind = as_host_array(background, (channels,), name="background", wants="the image")
+            self._behind = renderer.device.array(behind)
 
     def function(self, jax: Any) -> Any:
         """From arrays by name to the image and alpha."""
@@ -171,19 +186,25 @@ class _Drawing:
         drawn.defvjp(lambda splats: (drawn(splats), splats), back)
         return drawn
 
-    def _frame(self, splats: Arrays) -> Frame:
-        hosts = {name: np.asarray(values) for name, values in splats.items()}
+    def _frame(self, hosts: Arrays) -> Frame:
+        _check_ranges(hosts, self._renderer.settings)
         placed = Splats.upload(self._renderer.device, **hosts)
         return self._renderer.forward(placed, self._camera, background=self._behind)
 
     def _draw(self, splats: Arrays) -> tuple[NDArray[Any], NDArray[Any]]:
-        frame, device = self._frame(splats), self._renderer.device
+        hosts, device = _hosts(splats), self._renderer.device
+        if not _finite(*hosts.values()):
+            alpha = np.full((*self._shape[:2], 1), np.nan, np.float32)
+            return np.full(self._shape, np.nan, np.float32), alpha
+        frame = self._frame(hosts)
         return device.get(frame.image), 1 - device.get(frame.transmittance)[..., None]
 
     def _gradients(self, splats: Arrays, image: Any, alpha: Any) -> Arrays:
-        device = self._renderer.device
+        hosts, device = _hosts(splats), self._renderer.device
+        if not _finite(*hosts.values(), image, alpha):
+            return {name: np.full(v.shape, np.nan, np.float32) for name, v in hosts.items()}
         found = self._renderer.backward(
-            self._frame(splats),
+            self._frame(hosts),
             device.array(np.asarray(image), np.float32),
             device.array(-np.asarray(alpha)[..., 0], np.float32),
             with_background=False,
@@ -193,6 +214,28 @@ class _Drawing:
         by_name |= {name: getattr(found.splats, name, None) for name in _PARAMETERS[:4]}
         by_name["covars"] = found.splats.covars
         return {name: device.get(by_name[name]) for name in splats}
+
+
+def _hosts(splats: Arrays) -> Arrays:
+    return {name: np.asarray(values) for name, values in splats.items()}
+
+
+def _finite(*arrays: Any) -> bool:
+    return all(np.isfinite(np.asarray(array)).all() for array in arrays)
+
+
+def _check_ranges(hosts: Arrays, settings: SplatSettings) -> None:
+    """Check scales and opacities as far as they are given; what is not finite is passed over."""
+    ends = {
+        name: [float(end.reduce(hosts[name], axis=None)) for end in (np.fmin, np.fmax)]
+        for name in ("scales", "opacities")
+        if name in hosts and hosts[name].size
+    }
+    if "scales" in ends:
+        check_scales(ends["scales"][0])
+    if "opacities" in ends:
+        least, most = ends["opacities"]
+        check_opacities(least, most, settings)
 
 
 def _check(name: str, x: Any, shape: tuple[int, ...], dtype: np.dtype[Any]) -> None:

@@ -179,3 +179,53 @@ def test_splats_that_cannot_be_drawn_are_named(device):
         render({n: v for n, v in given.items() if n != "sh"}, camera(), device=device)
     with pytest.raises(InputError, match="quats and scales"):
         render({n: v for n, v in given.items() if n != "quats"}, camera(), device=device)
+
+
+RANGES = {
+    "logits": ({"opacities": lambda v: 5 * v}, {}, r"opacities go from.*sigmoid"),
+    "logarithms": ({"scales": jnp.log}, {}, r"scales go down to.*exp"),
+    "densities": ({"opacities": lambda v: -v}, {"mode": "xray"}, "densities in xray mode"),
+}
+
+
+@pytest.mark.parametrize("case", RANGES)
+def test_values_out_of_their_range_are_named_compiled_or_not(device, case):
+    changes, mode, words = RANGES[case]
+    given = splats() | {name: change(splats()[name]) for name, change in changes.items()}
+    settings = rift.SplatSettings(**mode)
+
+    def draw(given):
+        return render(given, camera(), settings=settings, device=device)[0]
+
+    with pytest.raises(InputError, match=words):
+        draw(given)
+    with pytest.raises(jax.errors.JaxRuntimeError, match=words):
+        jax.block_until_ready(jax.jit(draw)(given))
+
+
+@pytest.mark.parametrize("name", ["means", "quats", "scales", "opacities", "sh"])
+def test_splats_that_are_not_finite_make_all_nan(device, name):
+    given = splats()
+    given[name] = given[name].at[0].set(jnp.nan)
+
+    def draw(given):
+        return render(given, camera(), device=device)
+
+    for image, alpha in (draw(given), jax.jit(draw)(given)):
+        assert np.isnan(image).all() and np.isnan(alpha).all()
+    gradients = jax.grad(lambda given: draw(given)[0].sum())(given)
+    assert all(np.isnan(gradient).all() for gradient in gradients.values())
+    gradients = jax.grad(lambda given: jnp.inf * draw(given)[0].sum())(splats())
+    assert all(np.isnan(gradient).all() for gradient in gradients.values())
+
+
+def test_a_background_that_does_not_fit_is_named(device):
+    with pytest.raises(ShapeError, match=r"background has shape \(2,\).*\(3,\)"):
+        render(splats(), camera(), background=[1, 2], device=device)
+    xray = rift.SplatSettings(mode="xray")
+    with pytest.raises(InputError, match=r"background.*xray"):
+        render(splats(), camera(), background=[1, 2, 3], settings=xray, device=device)
+    with pytest.raises(DTypeError, match="background"):
+        jax.grad(lambda b: render(splats(), camera(), background=b, device=device)[0].sum())(
+            jnp.ones(3)
+        )
