@@ -272,6 +272,7 @@ class Trainer:
                 f"{type(self.strategy).__name__}.after_step: gave {self.parameters!r}, wanted the "
                 "Parameters to go on with"
             )
+        self._check_step(step + 1)
         self._check_count(len(parameters))
         relocated = self.parameters is not parameters
         if relocated:
@@ -281,6 +282,15 @@ class Trainer:
         if self._band is not None and (relocated or self.parameters.step % _BAND_EVERY == 0):
             self._limit_band()
         return value
+
+    def _check_step(self, wanted: int) -> None:
+        """Check that the strategy left the count of steps alone, by which a run ends."""
+        if self.parameters.step != wanted:
+            raise InputError(
+                f"step {wanted}: {type(self.strategy).__name__}.after_step gave Parameters of step "
+                f"{self.parameters.step}: make others by replaced or selected of those that came, "
+                "or by Parameters.of(..., step=parameters.step)"
+            )
 
     def _check_count(self, before: int) -> None:
         """Check what the strategy made of the number of splats."""

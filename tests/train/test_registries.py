@@ -269,7 +269,11 @@ class Forgetful(StrategySettings):
             def after_step(self, parameters, frame, gradients, learning_rate):
                 return parameters.selected(np.arange(2 * len(parameters)) // 2)
 
-        kinds = {"runless": Runless, "lost": Lost, "growing": Growing}
+        class Anew(Strategy):
+            def after_step(self, parameters, frame, gradients, learning_rate):
+                return Parameters.of(parameters.device, start_splats(np.eye(3)))
+
+        kinds = {"runless": Runless, "lost": Lost, "growing": Growing, "anew": Anew}
         return kinds[self.made](run) if self.made in kinds else None
 
 
@@ -279,6 +283,7 @@ class Forgetful(StrategySettings):
         ("nothing", r"Forgetful\.begin: gave None, wanted a Strategy"),
         ("runless", r"Forgetful\.begin: .* super\(\).__init__\(run\)"),
         ("lost", r"Lost\.after_step: gave None, wanted the Parameters"),
+        ("anew", r"step 1: Anew\.after_step gave Parameters of step 0.*step=parameters\.step"),
         ("growing", r"step 1: Growing made 40 splats of 20, wanted at most 30"),
     ],
 )

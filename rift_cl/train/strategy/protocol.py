@@ -163,7 +163,7 @@ class Strategy:
             learning_rate: of the positions in the step, in units of the scene.
 
         Returns:
-            These parameters, or others in their place (``Parameters.replaced``).
+            These parameters, or others in their place (``Parameters.replaced``), at the same step.
         """
         return parameters
 
