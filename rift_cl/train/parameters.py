@@ -14,13 +14,14 @@ from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from rift_cl.cl.adam import Adam, AdamStep, constants
 from rift_cl.cl.arithmetic import axpby, copy_columns
 from rift_cl.cl.array import DeviceArray
 from rift_cl.cl.device import Device
 from rift_cl.cl.elementwise import multiply
+from rift_cl.cl.host_arrays import as_real_array, is_device_array
 from rift_cl.errors import InputError
 from rift_cl.splat.projection import SplatGradients
 from rift_cl.splat.renderer import FrameGradients
@@ -169,15 +170,19 @@ class Parameters:
             environment=self.environment,
         )
 
-    def selected(self, rows: NDArray[np.bool_] | NDArray[np.intp]) -> Parameters:
+    def selected(self, rows: ArrayLike) -> Parameters:
         """Some of these splats with their moments, by index or mask; see ``replaced``.
 
+        Args:
+            rows: a mask of bool, (N,), or indices: a NumPy array, or what becomes one, as lists and
+                tensors do; not an array on the device.
+
         Raises:
-            InputError: a mask has not a value for each splat, or is one of whole numbers, which
-                would be read as indices; or an index is that of no splat.
+            InputError: ``rows`` is no such array; a mask has not a value for each splat, or is one
+                of whole numbers, which would be read as indices; or an index is that of no splat.
         """
-        _check_rows(rows, len(self))
-        groups = ({name: array[rows] for name, array in group.items()} for group in self.host())
+        chosen = _rows_of(rows, len(self))
+        groups = ({name: array[chosen] for name, array in group.items()} for group in self.host())
         return self.replaced(*groups)
 
     def update(
@@ -368,15 +373,21 @@ class Parameters:
         self.activate()
 
 
-def _check_rows(rows: NDArray[Any], count: int) -> None:
-    """Check what selects some of ``count`` splats; see ``Parameters.selected``."""
+def _rows_of(given: Any, count: int) -> NDArray[Any]:
+    """What selects some of ``count`` splats, checked; see ``Parameters.selected``."""
+    if is_device_array(given):
+        raise InputError(
+            "Parameters.selected: rows is an array on the device: give parameters.device.get(rows) "
+            "or a mask made of that"
+        )
+    rows = as_real_array(given, name="Parameters.selected: rows")
     kind, wanted = rows.dtype.kind, f"wanted a mask of bool, ({count},), or indices below {count}"
     if rows.ndim != 1 or kind not in "biu" or (kind == "b" and len(rows) != count):
         raise InputError(
             f"Parameters.selected: rows has type {rows.dtype} and shape {rows.shape}, {wanted}"
         )
     if kind == "b":
-        return
+        return rows
     if len(rows) == count > 2 and set(np.unique(rows).tolist()) <= {0, 1}:
         raise InputError(
             "Parameters.selected: a mask of whole numbers would be read as indices, of splats "
@@ -386,6 +397,7 @@ def _check_rows(rows: NDArray[Any], count: int) -> None:
         raise InputError(
             f"Parameters.selected: rows has indices from {rows.min()} to {rows.max()}, {wanted}"
         )
+    return rows
 
 
 def _moments(

@@ -224,6 +224,16 @@ def test_a_mask_of_whole_numbers_is_not_read_as_indices(device):
         splats.selected(np.array([1, 0, 1]))
 
 
+def test_lists_and_whatever_becomes_an_array_select_splats(device):
+    splats = Parameters.of(device, start_splats(np.eye(3)))
+    assert len(splats.selected([True, False, True])) == 2
+    assert len(splats.selected((2, 0, 1))) == 3
+    with pytest.raises(InputError, match=r"on the device: give .*device\.get\(rows\)"):
+        splats.selected(splats.drawn.opacities)
+    with pytest.raises(InputError, match=r"Parameters.selected: rows"):
+        splats.selected(None)
+
+
 @pytest.mark.parametrize(
     ("rows", "said"),
     [
