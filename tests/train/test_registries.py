@@ -13,6 +13,7 @@ from rift_cl.basis.angular import (
     angular_basis,
     register_angular_basis,
 )
+from rift_cl.basis.angular.own_basis import check_own_basis
 from rift_cl.commands.fit_photos.settings import FitPhotosSettings
 from rift_cl.commands.fit_xray.settings import FitXraySettings
 from rift_cl.commands.run_folder.saved_settings import parsed_settings
@@ -193,6 +194,27 @@ def test_a_basis_that_is_wrong_is_refused_before_a_fit(monkeypatch, change, said
             angular_basis("wrong", 4)
     finally:
         ANGULAR_BASES.remove("wrong")
+
+
+@pytest.mark.parametrize(
+    "kept",
+    [lambda values: values.astype("f4"), lambda values: values.astype("f4").astype("f8")],
+    ids=["float32", "computed in float32"],
+)
+def test_a_basis_in_float32_is_taken_if_it_is_right(kept):
+    class Single(SphericalGaussians):
+        sign = 1
+
+        def slopes(self, geometry, directions):
+            right = super().slopes(geometry, directions)
+            return right._replace(
+                values=kept(right.values), by_geometry=kept(self.sign * right.by_geometry)
+            )
+
+    check_own_basis("single", Single(3), 4)
+    Single.sign = 1.1
+    with pytest.raises(InputError, match="the derivative is not that of the function"):
+        check_own_basis("single", Single(3), 4)
 
 
 def test_a_fit_that_diverges_stops_where_it_is_seen(device, monkeypatch):
