@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+import copy
+import pickle
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.spatial import cKDTree
 
 from rift_cl.errors import InputError, NonFiniteError, ShapeError
+from rift_cl.sampling.targets.prior import PowerLaw
 from rift_cl.sampling.targets.target import Target, half_ball, half_disc
 
 
@@ -17,6 +22,34 @@ def test_what_is_not_given_has_a_default():
     assert target.k.shape == (1500, 3)
     assert target.prior.power(target.k, 4.0).shape == (1500,)
     assert Target((0, 0, 0), 4.0, band=0.5).highest == 0.5
+
+
+ONE = {
+    "points": [[1, 2, 3], [2, 2, 3]],
+    "normals": [[3, 1, 2], [0, 1, 0]],
+    "mode": "surface",
+    "frequencies": [[0.1, 0.2, 0.3]],
+    "seen_from": [[1, 1, 1]],
+}
+
+
+def test_targets_are_equal_by_value_and_so_are_their_copies():
+    target, again = Target((1, 2, 3), 4.0, **ONE), Target([1.0, 2, 3], 4, **ONE)
+    assert target == again and hash(target) == hash(again)
+    for alike in (pickle.loads(pickle.dumps(target)), copy.copy(target), copy.deepcopy(target)):
+        assert alike == target and hash(alike) == hash(target)
+        for name in ("center", "points", "normals", "seen_from", "k"):
+            with pytest.raises(ValueError, match="read-only"):
+                getattr(alike, name)[0] = 0
+    others = (
+        {"diameter": 5.0},
+        {"band": 1.0},
+        {"prior": PowerLaw(3.0)},
+        {"normals": [[1, 0, 0]] * 2},
+    )
+    for change in others:
+        assert replace(target, **change) != target
+    assert target != "target"
 
 
 def test_frequencies_fill_the_half_ball_and_are_the_same_each_time():

@@ -6,7 +6,7 @@ Lengths are in the unit of the world, frequencies in cycles per that unit.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from functools import cached_property
 from typing import Any, Literal
 
@@ -31,7 +31,7 @@ _GOLDEN = (math.sqrt(5) - 1) / 2
 
 @dataclass(frozen=True, eq=False)
 class Target:
-    """A target, and the frequencies that are wanted of it.
+    """A target, and the frequencies that are wanted of it; its arrays are read-only.
 
     Args:
         center: (3,) its middle.
@@ -96,6 +96,27 @@ class Target:
             )
         self._check_mode()
 
+    def __eq__(self, other: object) -> bool:
+        """Targets are equal when all their numbers are, and their priors."""
+        return isinstance(other, Target) and (
+            (self._key(), self.prior) == (other._key(), other.prior)
+        )
+
+    def __hash__(self) -> int:
+        """Equal targets hash equally; a prior of one's own need not be hashable."""
+        return hash(self._key())
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        """Be a copy, whose arrays are read-only as well."""
+        for value in state.values():
+            if isinstance(value, np.ndarray):
+                value.flags.writeable = False
+        vars(self).update(state)
+
+    def _key(self) -> tuple[Any, ...]:
+        values = (getattr(self, entry.name) for entry in fields(self) if entry.name != "prior")
+        return tuple(v.tobytes() if isinstance(v, np.ndarray) else v for v in values)
+
     def _check_mode(self) -> None:
         if self.seen_from is not None:
             toward = _array("seen_from", self.seen_from, (None, 3))
@@ -142,8 +163,10 @@ class Target:
 
     @cached_property
     def k(self) -> Floats:
-        """(K, 3) the frequencies to count with."""
-        return self.frequencies if self.frequencies is not None else half_ball(self.highest)
+        """(K, 3) the frequencies to count with; read-only."""
+        if self.frequencies is not None:
+            return self.frequencies
+        return _held(half_ball(self.highest))
 
     @property
     def is_flat(self) -> bool:
@@ -182,7 +205,7 @@ def _units(name: str, vectors: Floats) -> Floats:
     lengths = np.linalg.norm(vectors, axis=1, keepdims=True)
     if not lengths.all():
         raise InputError(f"Target: {name}[{int(np.argmin(lengths))}] is zero")
-    return np.asarray(vectors / lengths)
+    return _held(np.asarray(vectors / lengths))
 
 
 def _array(name: str, values: ArrayLike, shape: tuple[int | None, ...]) -> Floats:
@@ -197,4 +220,10 @@ def _array(name: str, values: ArrayLike, shape: tuple[int | None, ...]) -> Float
         raise ShapeError(f"Target: {name} has shape {array.shape}, wanted {wanted}")
     if not np.isfinite(array).all():
         raise NonFiniteError(f"Target: {name} holds NaN or infinity, every entry must be finite")
+    return _held(array)
+
+
+def _held(array: Floats) -> Floats:
+    """The same array, which nobody can change any more."""
+    array.flags.writeable = False
     return array
