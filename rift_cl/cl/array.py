@@ -1,4 +1,4 @@
-"""What the package uses of an array on a device.
+"""What the package, and an operator of one's own, uses of an array on a device.
 
 Such an array is a ``pyopencl.array.Array``, a package without types. This protocol says what of it
 is used, so that a type checker tells a device array from one on the host, from a table that may be
@@ -61,6 +61,24 @@ class DeviceArray(Protocol):
 
     def __getitem__(self, index: Any) -> DeviceArray:
         """A view of a part."""
+
+    def __setitem__(self, index: Any, values: Any) -> None:
+        """Write into a part, by the device."""
+
+    def __add__(self, other: Any) -> DeviceArray:
+        """The sum with an array on the device or a number, by pyopencl's own arithmetic."""
+
+    def __sub__(self, other: Any) -> DeviceArray:
+        """The difference."""
+
+    def __mul__(self, other: Any) -> DeviceArray:
+        """The product, number by number."""
+
+    def __truediv__(self, other: Any) -> DeviceArray:
+        """The quotient, number by number."""
+
+    def __neg__(self) -> DeviceArray:
+        """Every number with the other sign."""
 
     def reshape(self, shape: tuple[int, ...]) -> DeviceArray:
         """The same numbers in another shape."""

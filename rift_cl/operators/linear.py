@@ -20,7 +20,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Iterable
 from functools import cached_property, partial
 from importlib import import_module
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, overload
 
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
@@ -143,6 +143,19 @@ class LinearOperator(ABC):
         """The conjugate transpose, which is ``T``, since operators are real."""
         return self.T
 
+    @overload
+    def __call__(
+        self, x: NDArray[Any], out: NDArray[Any] | None = None, *, name: str = "x"
+    ) -> NDArray[Any]: ...
+
+    @overload
+    def __call__(
+        self, x: DeviceArray, out: DeviceArray | None = None, *, name: str = "x"
+    ) -> DeviceArray: ...
+
+    @overload
+    def __call__(self, x: Any, out: Any = None, *, name: str = "x") -> Any: ...
+
     def __call__(self, x: Any, out: Any = None, *, name: str = "x") -> Any:
         """Apply the operator.
 
@@ -188,6 +201,18 @@ class LinearOperator(ABC):
         check_apart(host, y, name=name)
         self._apply_host(host, y)
         return y
+
+    @overload
+    def __matmul__(self, other: LinearOperator) -> LinearOperator: ...
+
+    @overload
+    def __matmul__(self, other: NDArray[Any]) -> NDArray[Any]: ...
+
+    @overload
+    def __matmul__(self, other: DeviceArray) -> DeviceArray: ...
+
+    @overload
+    def __matmul__(self, other: Any) -> Any: ...
 
     def __matmul__(self, other: Any) -> Any:
         """``A @ B`` is the operator that applies B, then A; ``A @ x`` is ``A(x)``."""
@@ -360,11 +385,11 @@ class LinearOperator(ABC):
             )
 
     @abstractmethod
-    def _apply(self, x: DeviceArray, out: DeviceArray) -> None:
+    def _apply(self, x: DeviceArray, out: DeviceArray, /) -> None:
         """Write A x to ``out``; device arrays with the shapes of a chunk."""
 
     @abstractmethod
-    def _apply_adjoint(self, y: DeviceArray, out: DeviceArray) -> None:
+    def _apply_adjoint(self, y: DeviceArray, out: DeviceArray, /) -> None:
         """Write A' y to ``out``; device arrays with the shapes of a chunk."""
 
 

@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import copy
+import inspect
 import pickle
+import sys
+import typing
 
 import numpy as np
 import pytest
@@ -467,6 +470,21 @@ def test_a_function_of_an_operator_cannot_overwrite_what_it_is_applied_to(device
         with pytest.raises(InputError, match=r"writes into its argument.*copy"):
             B(given)
     assert (x == 1).all()
+
+
+@pytest.mark.skipif(sys.version_info < (3, 11), reason="typing.get_overloads is of Python 3.11")
+def test_a_type_checker_is_told_what_an_operator_gives_for_what():
+    for method, argument in ((LinearOperator.__call__, "x"), (LinearOperator.__matmul__, "other")):
+        hints = [typing.get_type_hints(way) for way in typing.get_overloads(method)]
+        told = [(hint[argument], hint["return"]) for hint in hints]
+        assert all(given == result for given, result in told)
+        assert told[-1] == (typing.Any, typing.Any) and len(told) > 2
+
+
+def test_an_own_operator_may_name_its_arrays_as_it_likes_and_be_its_own_adjoint():
+    for name in ("_apply", "_apply_adjoint"):
+        _, *arrays = inspect.signature(getattr(LinearOperator, name)).parameters.values()
+        assert [array.kind for array in arrays] == [inspect.Parameter.POSITIONAL_ONLY] * 2
 
 
 def test_a_host_operator_wants_shapes(device):
