@@ -72,6 +72,30 @@ def test_a_fit_is_scored_as_it_scored_itself(capture, fitted, tmp_path, capsys):
     assert "silhouette" in page and "cycles per pixel" in page
 
 
+def test_scored_photographs_that_were_trained_on_are_told(capture, fitted, tmp_path, capsys):
+    assert evaluate(fitted, tmp_path / "scores", capture) == 0
+    told = " ".join(capsys.readouterr().err.split())
+    assert f"6 of the 8 pictures of {capture.name}, such as 1.png, were trained on" in told
+    found, said = metrics_of(tmp_path / "scores"), metrics_of(fitted)["scores"]["held out"]
+    record = found["trained_on"][capture.name]
+    assert record["pictures"] == [f"{number}.png" for number in (1, 2, 3, 5, 6, 7)]
+    # The others are those that the fit held out, beside the same baselines.
+    assert record["others"] == pytest.approx(said, abs=1e-4)
+    compared = found["compared"][capture.name]["psnr"]
+    assert compared["pictures"] == 2
+    assert compared["fit"] == pytest.approx(said["fit_psnr"], abs=1e-4)
+    assert f"{said['fit_psnr']:.4g} dB over the 2 others" in told
+    whole = np.mean([view["fit_psnr"] for view in found["views"][capture.name]])
+    assert found["scores"][capture.name]["fit_psnr"] == pytest.approx(whole)
+    assert [view["angle"] is None for view in found["views"][capture.name]][:2] == [False, True]
+
+
+def test_nothing_is_said_of_photographs_that_were_held_out(fitted, tmp_path, capsys):
+    assert evaluate(fitted, tmp_path / "scores") == 0
+    assert "trained on, which" not in " ".join(capsys.readouterr().err.split())
+    assert "trained_on" not in metrics_of(tmp_path / "scores")
+
+
 def test_without_training_views_there_are_no_baselines(capture, fitted, tmp_path, capsys):
     assert evaluate(fitted / "scene.ply", tmp_path / "scores", capture, "--eps2d", 0.2) == 0
     found = metrics_of(tmp_path / "scores")

@@ -11,7 +11,11 @@ from typing import Any
 from rift_cl.commands.cameras.fit_cameras import FitCameras, open_fit_cameras
 from rift_cl.commands.evaluate.report import eval_page
 from rift_cl.commands.evaluate.settings import EvalSettings
-from rift_cl.commands.fit_photos.comparison import compared_record, comparison_notes
+from rift_cl.commands.fit_photos.comparison import (
+    compared_record,
+    comparison_notes,
+    trained_record,
+)
 from rift_cl.commands.fit_photos.pictures import CapturePictures
 from rift_cl.commands.fit_photos.scores import (
     Floats,
@@ -108,7 +112,11 @@ class Evaluation:
         return views[::every] if every else views
 
     def _training_views(self) -> tuple[View, ...]:
-        """Training views; empty if they are not known, or if they are the scored ones."""
+        """Training views; empty if they are not known.
+
+        Raises:
+            RiftError: the capture of --train cannot be read, or has photographs that are scored.
+        """
         if self.settings.train is None:
             return self._trained()
         views = open_seen(self.settings.train, pinhole=self.scene.pinhole).views
@@ -147,11 +155,11 @@ class Evaluation:
         return cameras.test_views
 
     def _trained(self) -> tuple[View, ...]:
-        """What the fit was trained on; empty where those photographs are gone, or are scored."""
+        """What the fit was trained on; empty where those photographs are gone."""
         cameras = self.cameras
         if cameras is None or not all(view.image.is_file() for view in cameras.training_views):
             return ()
-        return () if self._in_both(cameras.training_views) else cameras.training_views
+        return cameras.training_views
 
     def _in_both(self, training_views: tuple[View, ...]) -> str | None:
         """A photograph that is scored and was trained on, with its capture's name."""
@@ -206,6 +214,7 @@ class Evaluation:
             "background": {name: color.tolist() for name, color in self.backgrounds.items()},
             **score_record(self.scores),
             **compared_record(self.scores),
+            **trained_record(self.scores),
             **error_record(self.scores),
         }
         page = eval_page(self.scene.name, self.scores, self.metrics, self.notes)

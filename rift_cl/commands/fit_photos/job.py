@@ -14,7 +14,11 @@ from rift_cl.commands.fit.inputs import FitInput, photograph_inputs
 from rift_cl.commands.fit.probe import TRIED, probed, time_words
 from rift_cl.commands.fit.run import FitRun
 from rift_cl.commands.fit_photos.bare_input import BareInput
-from rift_cl.commands.fit_photos.comparison import compared_record, comparison_notes
+from rift_cl.commands.fit_photos.comparison import (
+    compared_record,
+    comparison_notes,
+    trained_record,
+)
 from rift_cl.commands.fit_photos.photograph_size import (
     check_window,
     factor_for,
@@ -264,6 +268,7 @@ class Fit(FitRun[FitPhotosSettings]):
             **exposure_record(trainer, self.training_views, self.scores),
             **score_record(self.scores),
             **compared_record(self.scores),
+            **trained_record(self.scores),
             **error_record(self.scores),
         }
         ramp = ramp_notes(settings, len(self.training_views))

@@ -54,6 +54,8 @@ class ViewScore:
         counted: (height, width) the pixels that count; None for all.
         exposure: (2, 3) gain and offset of each colour that ``image`` was given to fit the truth;
             None where it is as it was drawn.
+        trained: whether the splats were trained on this very picture, which so has no angle, no
+            distance and no baselines.
     """
 
     name: str
@@ -66,6 +68,7 @@ class ViewScore:
     places: ErrorPlaces | None = None
     counted: Mask | None = None
     exposure: NDArray[np.float64] | None = None
+    trained: bool = False
 
 
 def score_views(
@@ -88,13 +91,14 @@ def score_views(
         splats: what is scored.
         test: the pictures.
         training: those that were trained on; without them there are no angles, no distances and no
-            baselines.
+            baselines. Pictures of ``test`` that are among them have none either.
         more: scores by name besides PSNR and SSIM.
         given: cameras of ``test`` as they were given, where it has others.
         exposed: whether what is drawn is given the gains and offsets that fit the picture best.
     """
     cameras = (training or test).cameras
     behind, focus, up = test.behind, focus_of(cameras), common_up(cameras)
+    trained_on = {view.image.resolve() for view in training.views} if training else set()
 
     def drawn(camera: Camera) -> Floats:
         background = renderer.device.array(behind)
@@ -120,7 +124,8 @@ def score_views(
         values, angle, distance = scores_of(image, truth, masks, "fit", more), math.nan, math.nan
         if exposed or given is not None:
             values |= scores_of(test.shown(plain), truth, masks, "given", more)
-        if training is not None:
+        trained = test.views[number].image.resolve() in trained_on
+        if training is not None and not trained:
             angles = _angles(training.cameras, camera, focus)
             angle, distance = float(angles.min()), _distance(training.cameras, camera, focus)
             for name, blend in _baselines(training, angles, truth.shape, behind).items():
@@ -128,9 +133,8 @@ def score_views(
         elevation = math.nan if up is None else angles_of(camera, focus, up)[1]
         places = ErrorPlaces.of(image, truth, *masks)
         name = test.views[number].name
-        yield ViewScore(
-            name, angle, values, truth, image, elevation, distance, places, masks[0], exposure
-        )
+        where = (elevation, distance, places, masks[0])
+        yield ViewScore(name, angle, values, truth, image, *where, exposure, trained)
 
 
 def scores_of(
