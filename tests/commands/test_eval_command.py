@@ -205,6 +205,21 @@ def test_flip_is_scored_when_asked_for(capture, fitted, tmp_path, monkeypatch):
     assert "FLIP" in (tmp_path / "scores" / "report.html").read_text()
 
 
+def test_flip_is_left_out_where_its_filters_see_pixels_that_do_not_count(
+    capture, fitted, tmp_path, monkeypatch, capsys
+):
+    module = SimpleNamespace(evaluate=lambda *pair, **more: (None, 0.25, {}))
+    monkeypatch.setitem(sys.modules, "flip_evaluator", module)
+    masked = shutil.copytree(capture, tmp_path / "masked")
+    mask = np.zeros((60, 80))
+    mask[:, 30:50] = 1
+    write_png(masked / "5_mask.png", mask)
+    assert evaluate(fitted, tmp_path / "scores", masked, "--flip") == 0
+    assert "FLIP is left out for 1 of 8 photographs" in capsys.readouterr().err
+    found = metrics_of(tmp_path / "scores")["views"]["masked"]
+    assert [number for number, v in enumerate(found) if "fit_flip" not in v] == [5]
+
+
 def test_scores_that_cannot_be_had_are_named(fitted, tmp_path, monkeypatch, capsys):
     monkeypatch.setitem(sys.modules, "flip_evaluator", None)
     assert evaluate(fitted, tmp_path / "scores", "--flip") == 3

@@ -32,10 +32,18 @@ from rift_cl.commands.options import absolute_paths
 from rift_cl.commands.run_folder.run_folder import RunFolder
 from rift_cl.errors import InputError
 from rift_cl.io.captures.capture import View, camera_at, capture_name, holds_bare_photographs
-from rift_cl.metrics import flip
+from rift_cl.metrics import flip, flip_pixels
 from rift_cl.metrics.perceptual import flip_evaluator
 from rift_cl.progress import Report
 from rift_cl.splat.renderer import Renderer
+
+# Of what photographs a score has no meaning.
+_WHY_NOT = {
+    "flip": "whose pixels that count all lie within 10 pixels of ones that do not (a mask, or a "
+    "lens), which its filters see as well",
+    "lpips": "whose pixels do not all count (a mask, or a lens): it has no map that could be "
+    "averaged over the others",
+}
 
 
 class Evaluation:
@@ -257,14 +265,13 @@ class Evaluation:
         ]
 
     def _left_out(self) -> list[str]:
-        """A sentence about pictures that a score has no meaning of."""
+        """Sentences about pictures that a score has no meaning of."""
         scores = [score for group in self.scores.values() for score in group]
-        lacking = sum("fit_lpips" not in score.values for score in scores)
-        if "lpips" not in self.more or not lacking:
-            return []
+        lacking = {kind: sum(f"fit_{kind}" not in s.values for s in scores) for kind in self.more}
         return [
-            f"LPIPS is left out for {lacking} of {len(scores)} photographs, whose pixels do not "
-            "all count (a mask, or a lens): it has no map that could be averaged over the others"
+            f"{kind.upper()} is left out for {count} of {len(scores)} photographs, {_WHY_NOT[kind]}"
+            for kind, count in lacking.items()
+            if count
         ]
 
     def _pictures(
@@ -280,7 +287,9 @@ class Evaluation:
         )
 
 
-def _flip(image: Floats, truth: Floats, counted: Mask | None) -> float:
+def _flip(image: Floats, truth: Floats, counted: Mask | None) -> float | None:
+    if counted is not None and not flip_pixels(counted).any():
+        return None
     return flip(image, truth, mask=counted)
 
 

@@ -146,8 +146,7 @@ def scores_of(
 ) -> dict[str, float]:
     """PSNR and SSIM of all that counts, and PSNR of the foreground, where there is one.
 
-    Maps of SSIM and FLIP are averaged over the pixels that count. Their windows find the truth in
-    the others, so that nothing that is drawn there changes a score.
+    Nothing that is drawn or photographed at the others changes a score.
 
     Args:
         image: (height, width, C) what is scored.
@@ -158,8 +157,6 @@ def scores_of(
         more: further scores of all that counts.
     """
     counted, foreground = masks
-    if counted is not None:
-        image = np.where(counted[..., None], image, truth)
     channels = range(truth.shape[2])
     values = {
         f"{name}_psnr": psnr(image, truth, mask=_of_samples(counted, truth)),
