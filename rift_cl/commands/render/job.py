@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rift_cl.cl.budget import format_bytes
-from rift_cl.commands.cameras.camera_path import opened, resized, smooth_path
+from rift_cl.commands.cameras.camera_path import in_film_order, opened, resized, smooth_path
 from rift_cl.commands.cameras.film_path import (
     capture_arc,
     farthest_from_cameras,
@@ -174,7 +174,7 @@ class Render:
 
     def _path(self) -> list[Camera]:
         settings = self.settings
-        views = self._named().views
+        views = in_film_order(self._named())
         self._lens_notes = _lens_notes(views)
         cameras = [view.camera for view in views]
         if settings.size is not None:

@@ -32,9 +32,10 @@ class CameraOptions:
     group: ClassVar[str] = "camera"
 
     path: Auto[Path] = None
-    """Render the views of this capture (a transforms.json, a COLMAP model, or a fit), in its order,
-    instead of a film. With --between, the key_frames.json of an earlier film, edited, gives
-    another film."""
+    """Render the views of this capture (a transforms.json, a COLMAP model, a fit, or a camera path
+    of nerfstudio), in its order, instead of a film; those of a COLMAP model by their names, in
+    which frame2 comes before frame10. With --between, the key_frames.json of an earlier film,
+    edited, gives another film."""
     between: int = 0
     """Number of frames to interpolate between consecutive views of --path."""
     frames: Auto[int] = None
