@@ -238,6 +238,7 @@ def test_scores_that_cannot_be_had_are_named(fitted, tmp_path, monkeypatch, caps
         (("CAPTURE", "--hold-out", -1), "--hold-out is -1"),
         (("CAPTURE", "--downscale", 0), "downscale is 0"),
         (("CAPTURE", "--downscale", 100), "downscale is 100"),
+        (("CAPTURE", "--downscale", 6), "--downscale 6 leaves 13 x 10 pixels of 0.png"),
         (("nowhere",), "nowhere"),
         (("CAPTURE", "--train", "nowhere"), "nowhere"),
     ],

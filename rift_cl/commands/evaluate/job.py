@@ -16,6 +16,7 @@ from rift_cl.commands.fit_photos.comparison import (
     comparison_notes,
     trained_record,
 )
+from rift_cl.commands.fit_photos.photograph_size import check_window
 from rift_cl.commands.fit_photos.pictures import CapturePictures
 from rift_cl.commands.fit_photos.scores import (
     Floats,
@@ -71,8 +72,10 @@ class Evaluation:
             raise InputError("two captures have the same name: rename one folder")
         self.training_views = self._training_views()
         self.more = self._more()
-        for view in [*self.training_views, *(v for views in self.groups.values() for v in views)]:
+        scored = [view for views in self.groups.values() for view in views]
+        for view in [*self.training_views, *scored]:
             camera_at(view, self.downscale)
+        check_window(scored, self.downscale)
         self.device = settings.open_device()
         self.folder = RunFolder.of(settings, "eval")
         # What is to be said of how pictures were scored, a sentence each.
