@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from rift_cl.commands.cameras.fit_cameras import FitCameras, open_fit_cameras
+from rift_cl.commands.cameras.pose_check import check_sight, unseen_notes
 from rift_cl.commands.evaluate.report import eval_page
 from rift_cl.commands.evaluate.settings import EvalSettings
 from rift_cl.commands.fit_photos.comparison import (
@@ -33,6 +34,7 @@ from rift_cl.commands.options import absolute_paths
 from rift_cl.commands.run_folder.run_folder import RunFolder
 from rift_cl.errors import InputError
 from rift_cl.io.captures.capture import View, camera_at, capture_name, holds_bare_photographs
+from rift_cl.io.captures.capture_notes import range_notes
 from rift_cl.metrics import flip, flip_pixels
 from rift_cl.metrics.perceptual import flip_evaluator
 from rift_cl.progress import Report
@@ -64,6 +66,8 @@ class Evaluation:
         self.scene = settings.open_scene()
         chosen = settings.downscale
         self.downscale = self.scene.downscale if chosen is None else chosen
+        # What is to be said of the captures, and of how pictures were scored, a sentence each.
+        self.notes: list[str] = []
         self.cameras = self._cameras()
         self.groups = {capture_name(path): self._scored(path) for path in settings.captures}
         if not self.groups:
@@ -76,10 +80,10 @@ class Evaluation:
         for view in [*self.training_views, *scored]:
             camera_at(view, self.downscale)
         check_window(scored, self.downscale)
+        if settings.captures:
+            self.notes += range_notes(scored, downscale=self.downscale, light=self.scene.light)
         self.device = settings.open_device()
         self.folder = RunFolder.of(settings, "eval")
-        # What is to be said of how pictures were scored, a sentence each.
-        self.notes: list[str] = []
         self.metrics: dict[str, Any] = {}
         self.scores: dict[str, list[ViewScore]] = {}
         # What pictures of each group are drawn over, in the scene's light.
@@ -109,7 +113,8 @@ class Evaluation:
         """The views of a capture that are scored.
 
         Raises:
-            RiftError: it cannot be read, or is the fit's own, whose photographs the fit knows.
+            RiftError: it cannot be read, its poses are not those of its points, or it is the fit's
+                own, whose photographs the fit knows.
         """
         fit, scene = self.scene.folder, self.settings.scene
         inside = fit is not None and path.resolve().is_relative_to(fit.resolve())
@@ -118,8 +123,10 @@ class Evaluation:
                 f"{path}: is no capture with photographs; to score the held-out photographs, name "
                 f"only the fit: rift eval {scene}"
             )
-        views = open_seen(path, pinhole=self.scene.pinhole).views
-        every = self.settings.hold_out
+        capture = open_seen(path, pinhole=self.scene.pinhole)
+        views, every = capture.views, self.settings.hold_out
+        check_sight([view.camera for view in views], capture.points, path)
+        self.notes += capture.notes
         return views[::every] if every else views
 
     def _training_views(self) -> tuple[View, ...]:
@@ -195,6 +202,7 @@ class Evaluation:
             "eps2d": f"{self.scene.rendering.eps2d:g}",
             "background": self._told
             or "the common border of the scored photographs, or black without one",
+            **({"notes": "; ".join(self.notes)} if self.notes else {}),
             "scores": ", ".join(["PSNR", "SSIM", *(name.upper() for name in self.more)]),
             "device": self.device.name,
         }
@@ -216,6 +224,8 @@ class Evaluation:
         self.scores = {name: scores for name, scores in self.scores.items() if scores}
         if not self.scores:
             raise InputError(f"{self.scene.name}: every mask is black, there is nothing to score")
+        every = [score for scores in self.scores.values() for score in scores]
+        self.notes += unseen_notes(sum(score.unseen for score in every), len(every))
         self.notes += [*self._pose_notes(), *self._exposure_notes(), *self._left_out()]
         self.notes += comparison_notes(self.scores)
         self.metrics = {

@@ -25,7 +25,7 @@ from rift_cl.commands.inputs.scene_bounds import common_up
 from rift_cl.commands.pictures.views_table import angles_of
 from rift_cl.geometry import Camera
 from rift_cl.metrics import psnr, ssim
-from rift_cl.splat.renderer import Renderer
+from rift_cl.splat.renderer import Picture, Renderer
 from rift_cl.splat.splats import Splats
 from rift_cl.train.per_view.exposures import fitted_exposure
 from rift_cl.train.start.points import focus_of
@@ -56,6 +56,7 @@ class ViewScore:
             None where it is as it was drawn.
         trained: whether the splats were trained on this very picture, which so has no angle, no
             distance and no baselines.
+        unseen: whether no splat is in sight.
     """
 
     name: str
@@ -69,6 +70,7 @@ class ViewScore:
     counted: Mask | None = None
     exposure: NDArray[np.float64] | None = None
     trained: bool = False
+    unseen: bool = False
 
 
 def score_views(
@@ -100,9 +102,8 @@ def score_views(
     behind, focus, up = test.behind, focus_of(cameras), common_up(cameras)
     trained_on = {view.image.resolve() for view in training.views} if training else set()
 
-    def drawn(camera: Camera) -> Floats:
-        background = renderer.device.array(behind)
-        return renderer.picture(splats, camera, background=background).image
+    def drawn(camera: Camera) -> Picture:
+        return renderer.picture(splats, camera, background=renderer.device.array(behind))
 
     for number, camera in enumerate(test.cameras):
         counted, foreground = test.counted(number), test.foreground(number)
@@ -114,9 +115,9 @@ def score_views(
             continue
         # A lens may well leave nothing out.
         masks = None if counted is None or counted.all() else counted, foreground
-        photograph, image, exposure = test.over(number, behind), drawn(camera), None
+        photograph, (image, rest), exposure = test.over(number, behind), drawn(camera), None
         truth = test.shown(photograph)
-        plain = image if given is None else drawn(given[number])
+        plain = image if given is None else drawn(given[number]).image
         if exposed:
             exposure = fitted_exposure(image, photograph, masks[0])
             image = (exposure[0] * image + exposure[1]).astype(np.float32)
@@ -134,7 +135,8 @@ def score_views(
         places = ErrorPlaces.of(image, truth, *masks)
         name = test.views[number].name
         where = (elevation, distance, places, masks[0])
-        yield ViewScore(name, angle, values, truth, image, *where, exposure, trained)
+        unseen = bool(rest.min() >= 1)
+        yield ViewScore(name, angle, values, truth, image, *where, exposure, trained, unseen)
 
 
 def scores_of(
