@@ -66,7 +66,7 @@ class Frame(MayBeGivenUp):
 
     @property
     def image(self) -> DeviceArray:
-        """(height, width, D) device array, the background included."""
+        """(height, width, D) device array, the background included; ``get`` copies it to NumPy."""
         return self.raster_pass.raster.image
 
     @property
