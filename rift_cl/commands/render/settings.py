@@ -78,7 +78,8 @@ class FrameOutput:
     """Also write the expected depth along the camera's axis, in scene units."""
     normals: bool = False
     """Also write normals, in the scene's axes: the splats' shortest axes on the side that is seen,
-    which tell of a surface where splats are flat (rift fit photos --surface.normal-consistency)."""
+    which tell of a surface where splats are flat (rift fit photos --surface.normal-consistency): of
+    length 1 as OpenEXR, and as a PNG that is dark where little covers a pixel."""
 
 
 @dataclass(frozen=True)
