@@ -136,17 +136,45 @@ def test_flip_is_nothing_for_equal_pictures_and_nearly_all_for_black_and_white()
 
 
 def test_flip_of_a_part_is_the_mean_of_its_map_there(monkeypatch):
-    errors = np.random.default_rng(3).random((4, 5, 1), np.float32)
+    """Of those of its pixels whose filters, that reach 10 of them, see no other."""
+    errors = np.random.default_rng(3).random((40, 50, 1), np.float32)
     module = SimpleNamespace(evaluate=lambda *pair, **more: (errors, 0.25, {}))
     monkeypatch.setitem(sys.modules, "flip_evaluator", module)
-    image, mask = np.zeros((4, 5, 3)), np.zeros((4, 5), bool)
-    mask[1:3, :2] = True
+    image, mask = np.zeros((40, 50, 3)), np.zeros((40, 50), bool)
+    mask[3:30, :13] = True
     assert metrics.flip(image, image) == 0.25
-    wanted = errors[1:3, :2].mean(dtype=float)
+    wanted = errors[13:20, :3].mean(dtype=float)
     assert metrics.flip(image, image, mask=mask) == pytest.approx(wanted, abs=1e-12)
-    for wrong, words in ((0 * mask, "bool"), (mask[1:], "mask has shape"), (mask & False, "false")):
+    thin = mask & (np.arange(50) < 10)
+    for wrong, words in (
+        (0 * mask, "bool"),
+        (mask[1:], "mask has shape"),
+        (mask & False, "false"),
+        (thin, "filters"),
+    ):
         with pytest.raises(RiftError, match=words):
             metrics.flip(image, image, mask=wrong)
+
+
+@pytest.mark.parametrize("degrees", [67.0, 20.0])
+def test_pixels_that_do_not_count_have_no_part_in_flip(degrees):
+    """The reach of its filters is that of the package which computes it."""
+    pytest.importorskip("flip_evaluator")
+    rng = np.random.default_rng(0)
+    truth = rng.random((48, 60, 3))
+    image = np.clip(truth + 0.1 * rng.standard_normal(truth.shape), 0, 1)
+    y, x = np.mgrid[:48, :60]
+    mask = (y - 24) ** 2 + (x - 30) ** 2 < 18**2
+    scores = [
+        metrics.flip(*hidden, mask=mask, pixels_per_degree=degrees)
+        for hidden in (
+            (image, truth),
+            [np.where(mask[..., None], array, 1) for array in (image, truth)],
+            (image, np.where(mask[..., None], truth, 0)),
+        )
+    ]
+    # The package sums in float32.
+    assert scores[1:] == pytest.approx(scores[:1] * 2, rel=1e-6)
 
 
 @pytest.mark.parametrize(

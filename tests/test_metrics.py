@@ -49,15 +49,21 @@ def test_unsigned_images_do_not_wrap_round():
     assert metrics.psnr(np.uint8([[1]]), np.uint8([[3]]), peak=2) == pytest.approx(0)
 
 
-def wang(image, truth, peak):
-    """SSIM map from its definition, one window at a time, the border reflected."""
+def wang(image, truth, peak, mask=None):
+    """SSIM map from its definition, one window at a time, the border reflected.
+
+    With a mask, a window has the weights of the samples that count, whose sum is one.
+    """
     ticks = np.arange(-5, 6)
     kernel = np.exp(-(ticks**2) / (2 * 1.5**2))
-    weight = np.outer(kernel, kernel) / kernel.sum() ** 2
+    kernel_2d = np.outer(kernel, kernel)
     x, y = (np.pad(np.asarray(a, float), 5, mode="symmetric") for a in (image, truth))
+    counts = np.pad(np.ones(image.shape) if mask is None else mask, 5, mode="symmetric")
     result = np.empty(image.shape)
     for i, j in np.ndindex(image.shape):
         a, b = x[i : i + 11, j : j + 11], y[i : i + 11, j : j + 11]
+        about = kernel_2d * counts[i : i + 11, j : j + 11]
+        weight = about / about.sum() if about.any() else about
         ma, mb = (weight * a).sum(), (weight * b).sum()
         va, vb = (weight * a * a).sum() - ma**2, (weight * b * b).sum() - mb**2
         cov = (weight * a * b).sum() - ma * mb
@@ -74,7 +80,27 @@ def test_ssim_is_its_definition(pair, peak):
     mask = np.zeros(expected.shape, dtype=bool)
     mask[3:9, 4:20] = True
     score = metrics.ssim(*pair, peak=peak, mask=mask)
-    assert score == pytest.approx(expected[mask].mean(), rel=1e-9)
+    assert score == pytest.approx(wang(*pair, peak, mask)[mask].mean(), rel=1e-9)
+
+
+def test_ssim_of_all_samples_has_the_bits_of_scikit_image(pair):
+    from skimage.metrics import structural_similarity
+
+    image, truth = (array.astype(float) for array in pair)
+    options = {"gaussian_weights": True, "sigma": 1.5, "use_sample_covariance": False}
+    _, expected = structural_similarity(image, truth, data_range=1.0, full=True, **options)
+    assert metrics.ssim(*pair) == float(np.mean(expected))
+    assert metrics.ssim(*pair, mask=np.ones(image.shape, bool)) == metrics.ssim(*pair)
+
+
+def test_samples_that_do_not_count_have_no_part_in_ssim(pair):
+    image, truth = pair
+    mask = metrics.disc(Grid(truth.shape), radius=8)
+    score = metrics.ssim(image, truth, mask=mask)
+    for level in (0.0, 1.0, 50.0):
+        hidden = (np.where(mask, array, level).astype(np.float32) for array in pair)
+        assert metrics.ssim(*hidden, mask=mask) == score
+    assert score < metrics.ssim(np.where(mask, image, truth), truth)
 
 
 def test_ssim_of_equals_and_of_volumes(pair):

@@ -6,7 +6,8 @@
  * where (a, b; b, c) is the inverse of the screen covariance plus eps2d, weight = opacity * factor
  * and the extents are half the sides of the rectangle round the splat's ellipse. boxes[i] =
  * (x0, y0, x1, y1) are the tiles that this rectangle touches when its extents are rounded up to
- * pixels (gsplat's radii), x1 and y1 exclusive. depths[i] is the camera's z.
+ * pixels (gsplat's radii), x1 and y1 exclusive. depths[i] is the camera's z, or how
+ * far a splat is from a fisheye.
  *
  * An ellipse ends where weight * exp(-sigma) falls below 1/255, and at EXTENT standard deviations
  * at the latest; line integrals, which no display rounds, and SMOOTH cut-offs end at EXTENT always.
@@ -157,7 +158,7 @@ KERNEL void splat_project(
     UNROLL for (int k = 0; k < 4; k++) box[k] = drawn ? box[k] : 0;
     write_columns(screen, 8, 0, 8, rows, row);
     write_ints(boxes, 4, 0, 4, rows, box);
-    write_numbers(depths, rows, drawn ? g.point.z : 0);
+    write_numbers(depths, rows, drawn ? depth_of(g.point) : 0);
     write_bytes(culled, rows, code);
   }
 }

@@ -215,7 +215,7 @@ static CameraGradient screen_grad(
 #if DEFOCUS
   add_blur_grad(camera, g->point.z, view->variance, &out);
 #endif
-  out.point.z += depth;
+  add_depth_grad(g->point, depth, &out);
   return out;
 }
 

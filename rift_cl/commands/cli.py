@@ -359,9 +359,11 @@ def _render(settings: Any, output: Output) -> None:
     from rift_cl.commands.render.job import Render
 
     job = Render(settings)
-    _print_notes(job.notes)
+    told = job.notes
+    _print_notes(told)
     if not ran(job, settings, output):
         return
+    _print_notes([note for note in job.notes if note not in told])
     shown = ", ".join(filter(None, ["frames", job.film]))
     print(f"{shown} and report.html are in {settings.out}")
 

@@ -151,7 +151,7 @@ def fit(
 
 def evaluate(
     scene: PathLike,
-    captures: Sequence[PathLike] = (),
+    captures: PathLike | Sequence[PathLike] = (),
     out: PathLike | None = None,
     *,
     progress: Progress = None,
@@ -161,7 +161,7 @@ def evaluate(
 
     Args:
         scene: a fit, its folder, or a file of splats.
-        captures: what to score it by; the photographs that the fit held out when not given.
+        captures: one or more to score it by; the photographs that the fit held out when not given.
         out: folder for report.html, config.json and metrics.json; a temporary one when not given.
         progress: is called with a report for each picture; breaks off by returning False.
         **settings: the command's options by their names in Python; see ``EvalSettings``.
@@ -172,8 +172,9 @@ def evaluate(
     from rift_cl.commands.evaluate.job import Evaluation
     from rift_cl.commands.evaluate.settings import EvalSettings
 
+    several = (captures,) if isinstance(captures, (str, os.PathLike)) else tuple(captures)
     with _folder(out, EvalSettings) as (folder, keep):
-        given = {"scene": scene, "captures": tuple(captures), "out": folder, **settings}
+        given = {"scene": scene, "captures": several, "out": folder, **settings}
         job = Evaluation(_settings(given, "eval", EvalSettings))
         _run(job, progress)
         return keep(

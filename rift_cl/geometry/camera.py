@@ -40,7 +40,8 @@ class Camera:
         view: (4, 4) world-to-camera matrix, a rotation and a shift. Kept as ``K`` is.
         model: ``pinhole``; ``ortho`` (parallel rays, so that colours that depend on the direction
             are those along the camera's axis); ``fisheye`` (equidistant: the distance
-            from the principal point is proportional to the angle from the axis).
+            from the principal point is proportional to the angle from the axis, which may be more
+            than 90 degrees; splats are culled and sorted by their distance from it, not by z).
         aperture: the opening of a thin lens, for a pinhole camera that is sharp at one depth;
             None for one that is sharp everywhere.
 

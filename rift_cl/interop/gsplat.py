@@ -102,7 +102,9 @@ def rasterization(
         channel_chunk: changes nothing.
         distributed: not supported.
         camera_model: ``pinhole``, ``ortho`` or ``fisheye``. Harmonics are those of the directions
-            from where a camera stands, as in gsplat; our own ``ortho`` sees along its axis.
+            from where a camera stands, as in gsplat; our own ``ortho`` sees along its axis. Depths
+            of a ``fisheye``, by which it sorts as well, are distances from it: gsplat takes z and
+            leaves out what lies 90 degrees or more from the axis.
         segmented: changes nothing.
         covars: (..., N, 3, 3) covariances in place of ``quats`` and ``scales``.
         with_ut: not supported.

@@ -43,7 +43,7 @@ class Screens(NamedTuple):
         means2d: (V, N, 2) positions in pixels.
         conics: (V, N, 3) the inverse covariances' a, b, c.
         weights: (V, N) opacity times compensation or, of X-rays, line integral.
-        depths: (V, N) along the camera's axis.
+        depths: (V, N) along the camera's axis; distances from a fisheye.
         extents: (V, N, 2) half the sides of the rectangle round a splat, in pixels.
         boxes: (V, N, 4) int32, the tiles it touches.
         culled: (V, N) uint8, 0 for the splats that are drawn, or an index into ``CULL_REASONS``.

@@ -7,6 +7,7 @@ empty background would flatter it. Arrays of any real type are scored in double 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -17,6 +18,8 @@ from rift_cl.geometry import Grid
 
 # Samples along each side of the window of SSIM, and so of the smallest image that it takes.
 SSIM_WINDOW = 11
+# Its standard deviation in samples, and its constants as shares of the range of values.
+_SIGMA, _K1, _K2 = 1.5, 0.01, 0.03
 _Reals = NDArray[np.float64]
 _Mask = NDArray[np.bool_]
 
@@ -56,7 +59,9 @@ def ssim(
 
     The window is Gaussian, 11 samples wide with sigma 1.5, the covariance is the population's.
     The map is averaged over every sample of the mask, the reflected border included; means that
-    leave a border of 5 samples out differ a little.
+    leave a border of 5 samples out differ a little. A window's moments are those of the samples of
+    the mask in it, by their share of the window's weight, so that no other sample has a part in
+    the score.
 
     Args:
         image: what is scored: (y, x), or (z, y, x) with a three-dimensional window.
@@ -75,8 +80,6 @@ def ssim(
         InputError: ``peak`` is not a positive number, or not given and an array has an integer
             type and values above 1.
     """
-    from skimage.metrics import structural_similarity
-
     found, wanted, counts = _checked(image, truth, mask)
     scale = _full_scale("ssim", peak, image, truth)
     if found.ndim not in (2, 3) or min(found.shape) < SSIM_WINDOW:
@@ -84,16 +87,33 @@ def ssim(
             f"ssim: image has shape {found.shape}, wanted (y, x) or (z, y, x) with every side "
             f"{SSIM_WINDOW} or longer"
         )
-    _, similarity = structural_similarity(
-        found,
-        wanted,
-        data_range=scale,
-        gaussian_weights=True,
-        sigma=1.5,
-        use_sample_covariance=False,
-        full=True,
-    )
-    return float(np.mean(similarity[counts]))
+    return float(np.mean(_similarity(found, wanted, counts, scale)[counts]))
+
+
+def _similarity(x: _Reals, y: _Reals, counts: _Mask, scale: float) -> _Reals:
+    """The map of SSIM, with moments of the samples that count; of no meaning at the others."""
+    blurred = _window_of(counts)
+    mean_x, mean_y, xx, yy, xy = map(blurred, (x, y, x * x, y * y, x * y))
+    c1, c2 = (_K1 * scale) ** 2, (_K2 * scale) ** 2
+    luminance = 2 * mean_x * mean_y + c1
+    structure = 2 * (xy - mean_x * mean_y) + c2
+    spread = (xx - mean_x * mean_x) + (yy - mean_y * mean_y) + c2
+    return (luminance * structure) / ((mean_x**2 + mean_y**2 + c1) * spread)
+
+
+def _window_of(counts: _Mask) -> Callable[[_Reals], _Reals]:
+    """Means over SSIM's window about each sample, of the samples that count."""
+    from scipy.ndimage import gaussian_filter
+
+    def blurred(values: _Reals) -> _Reals:
+        radius = SSIM_WINDOW // 2
+        return np.asarray(gaussian_filter(values, _SIGMA, mode="reflect", radius=radius))
+
+    if counts.all():
+        return blurred
+    # About a sample that does not count there may be none that does.
+    share = np.where(counts, blurred(counts.astype(np.float64)), 1)
+    return lambda values: blurred(np.where(counts, values, 0)) / share
 
 
 def affine_fit(

@@ -33,7 +33,7 @@ class ProjectedSplats(NamedTuple):
         covars: (N, 2, 2) covariances with the dilation, in square pixels.
         conics: (N, 3) their inverses a, b, c.
         weights: (N,) opacity times factor.
-        depths: (N,) camera z.
+        depths: (N,) camera z; distances from a fisheye.
         factors: (N,) compensation, line integral through a unit peak, or 1.
         extents: (N, 2) half the bounding rectangle's sides before they are rounded up.
         radii: (N, 2) after.
@@ -81,12 +81,14 @@ def project_splats(
 ) -> ProjectedSplats:
     """Project Gaussians of (N, 3) means, (N, 3, 3) covariances and (N,) opacities."""
     points = means @ camera.view[:3, :3].T + camera.view[:3, 3]
+    # The rays of a fisheye go round by up to half a turn.
+    depths = np.linalg.norm(points, axis=1) if camera.model == "fisheye" else points[:, 2]
     with np.errstate(all="ignore"):
         centers, jacobians, rays = screen_map(camera, points)
         to_screen = jacobians @ camera.view[:3, :3]
         plain = to_screen @ covars @ to_screen.transpose(0, 2, 1)
         sharp = plain + eps2d * np.eye(2)
-        wide = sharp + _blur(camera, points[:, 2])[:, None, None] * np.eye(2)
+        wide = sharp + _blur(camera, depths)[:, None, None] * np.eye(2)
         determinants = np.linalg.det(wide)
         conics = np.stack([wide[:, 1, 1], -wide[:, 0, 1], wide[:, 0, 0]], 1) / determinants[:, None]
         factors = np.ones(len(means))
@@ -102,10 +104,10 @@ def project_splats(
         radii = np.ceil(extents)
         culled, boxes = _cull(camera, tile, centers, radii, radius_clip)
         culled[weights < _ALPHA_THRESHOLD if mode == "light" else ~(weights > 0)] = 3
-        culled[(points[:, 2] < near) | (points[:, 2] > far)] = 1
+        culled[(depths < near) | (depths > far)] = 1
     boxes[culled > 0] = 0
     return ProjectedSplats(
-        centers, wide, conics, weights, points[:, 2], factors, extents, radii, boxes, culled
+        centers, wide, conics, weights, depths, factors, extents, radii, boxes, culled
     )
 
 

@@ -60,7 +60,7 @@ class Projection:
             spreads. What is drawn of it in light mode lacks the share (1/255) / weight, as alphas
             below 1/255 do not count: much where a small splat is spread far. Extents are half the
             sides of the rectangle round all that is drawn of a splat.
-        depths: (N,) distances along the camera's axis, in scene units.
+        depths: (N,) distances along the camera's axis, in scene units; from a fisheye itself.
         boxes: (N, 4) int32 tile rectangles (x0, y0, x1, y1), x1 and y1 exclusive.
         culled: (N,) uint8, an index into ``CULL_REASONS``; splats with another code than 0 have
             zeros everywhere.

@@ -66,7 +66,7 @@ class Frame(MayBeGivenUp):
 
     @property
     def image(self) -> DeviceArray:
-        """(height, width, D) device array, the background included."""
+        """(height, width, D) device array, the background included; ``get`` copies it to NumPy."""
         return self.raster_pass.raster.image
 
     @property
@@ -207,11 +207,12 @@ class Renderer:
             camera: the view.
             background: (D,) device array, for all channels but depth; black if not given. Depth
                 has none, and in xray mode there is none.
-            depth: draw depth along the camera's axis as the last channel: ``accumulated``, the
-                sum of weights times depths; ``expected``, that divided by alpha; or ``median``,
-                the depth of the splat that leaves half of the light, or of the last one that is
-                seen where none does. Where splats lie before a surface and behind it, the expected
-                depth is that of neither. The median has no gradient.
+            depth: draw depth along the camera's axis, or distance from a fisheye, as the last
+                channel: ``accumulated``, the sum of weights times depths; ``expected``, that
+                divided by alpha; or ``median``, the depth of the splat that leaves half of the
+                light, or of the last one that is seen where none does. Where splats lie before a
+                surface and behind it, the expected depth is that of neither. The median has no
+                gradient.
 
         Returns:
             The frame: ``.image`` (height, width, D), ``.transmittance`` (height, width), and what

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import replace
 from itertools import pairwise
 
+import capture_files as made
 import numpy as np
 import pytest
 from test_start import MIDDLE_OF_RING, ring
 
 from rift_cl.commands.cameras.camera_path import (
+    in_film_order,
     orbit,
     orbit_distance,
     pinhole,
@@ -25,7 +28,32 @@ from rift_cl.commands.inputs.scene_bounds import (
 from rift_cl.errors import InputError
 from rift_cl.geometry import Camera
 from rift_cl.geometry.pose import look_at
+from rift_cl.io.captures.capture import open_capture
 from rift_cl.io.scenes.splat_scene import SplatScene
+
+
+def test_a_film_of_a_colmap_model_counts_the_numbers_in_names(tmp_path):
+    """A fit holds photographs out by plain names, as published splits do."""
+    names = ["frame10.png", "frame007.png", "frame2.png"]
+    made.photographs(tmp_path / "images", names)
+    images = made.colmap_text(tmp_path / "sparse" / "0") / "images.txt"
+    lines = images.read_text()
+    for before, name in zip(made.NAMES, names, strict=True):
+        lines = lines.replace(f" {before}", f" {name}")
+    images.write_text(lines)
+    capture = open_capture(tmp_path)
+    assert [view.name for view in capture.views] == sorted(names)
+    found = [view.name for view in in_film_order(capture)]
+    assert found == ["frame2.png", "frame007.png", "frame10.png"]
+
+
+def test_a_film_of_a_transforms_json_keeps_its_order(tmp_path):
+    file = made.transforms(tmp_path)
+    record = json.loads(file.read_text())
+    file.write_text(json.dumps(record | {"frames": record["frames"][::-1]}))
+    found = [view.name for view in in_film_order(open_capture(file))]
+    assert found == ["images/sub/c.png", "images/b.png", "images/a.png"]
+
 
 BOUNDS = SceneBounds(np.array([1.0, -2, 3]), 0.7, np.array([0, 0.6, 0.8]))
 

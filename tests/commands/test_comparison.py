@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -13,6 +14,7 @@ from rift_cl.commands.fit_photos.comparison import (
     compared_means,
     compared_record,
     comparison_notes,
+    trained_record,
 )
 from rift_cl.commands.fit_photos.report import doubt_notes, score_rows
 from rift_cl.commands.fit_photos.scores import ViewScore, mean_scores
@@ -63,6 +65,15 @@ def test_without_a_common_picture_the_fit_stands_alone():
     assert score_rows(compared_record(groups)) == [("held out", "PSNR", 15.0, None, None, None)]
     (note,) = comparison_notes(groups)
     assert "nothing to compare" in note and not doubt_notes(scores)
+
+
+def test_pictures_that_were_all_trained_on_leave_no_score():
+    scores = [replace(view("a", 20.0, angle=math.nan), trained=True)]
+    (note,) = comparison_notes({"cap": scores})
+    assert "1 of the 1 pictures of cap, such as a," in note and "none is left" in note
+    record = trained_record({"cap": scores, "other": [view("b", 10.0)]})
+    assert record == {"trained_on": {"cap": {"pictures": ["a"], "others": {}}}}
+    assert not trained_record({"other": [view("b", 10.0)]})
 
 
 def test_pictures_without_training_pictures_lack_nothing():

@@ -10,12 +10,13 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from test_trainer import Ball
+from test_trainer import MIDDLE, Ball
 
 import rift_cl as rift
 from rift_cl.commands.cli import main
 from rift_cl.io.captures.transforms_record import transforms_of
 from rift_cl.io.images.image import read_image, write_png
+from rift_cl.io.images.pixels import write_pixels
 from rift_cl.io.output import write_json
 
 
@@ -70,6 +71,81 @@ def test_a_fit_is_scored_as_it_scored_itself(capture, fitted, tmp_path, capsys):
             assert row.pop("region", None) == mine.pop("region", None)
             assert row == pytest.approx(mine, rel=1e-3), kind
     assert "silhouette" in page and "cycles per pixel" in page
+
+
+def test_scored_photographs_that_were_trained_on_are_told(capture, fitted, tmp_path, capsys):
+    assert evaluate(fitted, tmp_path / "scores", capture) == 0
+    told = " ".join(capsys.readouterr().err.split())
+    assert f"6 of the 8 pictures of {capture.name}, such as 1.png, were trained on" in told
+    found, said = metrics_of(tmp_path / "scores"), metrics_of(fitted)["scores"]["held out"]
+    record = found["trained_on"][capture.name]
+    assert record["pictures"] == [f"{number}.png" for number in (1, 2, 3, 5, 6, 7)]
+    # The others are those that the fit held out, beside the same baselines.
+    assert record["others"] == pytest.approx(said, abs=1e-4)
+    compared = found["compared"][capture.name]["psnr"]
+    assert compared["pictures"] == 2
+    assert compared["fit"] == pytest.approx(said["fit_psnr"], abs=1e-4)
+    assert f"{said['fit_psnr']:.4g} dB over the 2 others" in told
+    whole = np.mean([view["fit_psnr"] for view in found["views"][capture.name]])
+    assert found["scores"][capture.name]["fit_psnr"] == pytest.approx(whole)
+    assert [view["angle"] is None for view in found["views"][capture.name]][:2] == [False, True]
+
+
+def test_nothing_is_said_of_photographs_that_were_held_out(fitted, tmp_path, capsys):
+    assert evaluate(fitted, tmp_path / "scores") == 0
+    assert "trained on, which" not in " ".join(capsys.readouterr().err.split())
+    assert "trained_on" not in metrics_of(tmp_path / "scores")
+
+
+def test_doubts_of_a_capture_are_told(capture, fitted, tmp_path, capsys):
+    """Those that a fit tells of it: intrinsics of another size, numbers beyond white."""
+    record = json.loads((capture / "transforms.json").read_text())
+    folder = tmp_path / "doubted"
+    folder.mkdir()
+    for number, frame in enumerate(record["frames"]):
+        frame["cx"] = 5.0
+        frame["file_path"] = f"{number}.exr"
+        write_pixels(
+            folder / f"{number}.exr",
+            np.full((60, 80, 3), 2.0, np.float32),
+            format="openexr",
+            attributes={},
+        )
+    write_json(folder / "transforms.json", record)
+    assert evaluate(fitted, tmp_path / "scores", folder, "--hold-out", 4) == 0
+    told = " ".join(capsys.readouterr().err.split())
+    page = (tmp_path / "scores" / "report.html").read_text()
+    for words in ("the intrinsics are those of another size", "100 % of the numbers"):
+        assert words in told and words in page
+
+
+def test_views_without_a_splat_in_sight_are_told(capture, fitted, tmp_path, capsys):
+    record = json.loads((capture / "transforms.json").read_text())
+    folder = shutil.copytree(capture, tmp_path / "turned")
+    turned = np.array(record["frames"][0]["transform_matrix"]) @ np.diag([1, -1, -1, 1])
+    record["frames"][0]["transform_matrix"] = turned.tolist()
+    write_json(folder / "transforms.json", record)
+    assert evaluate(fitted, tmp_path / "scores", folder) == 0
+    assert "no splat is in sight of 1 of 8 views" in " ".join(capsys.readouterr().err.split())
+
+
+def test_poses_of_other_axes_are_refused_as_a_fit_refuses_them(capture, fitted, tmp_path, capsys):
+    record = json.loads((capture / "transforms.json").read_text())
+    folder = shutil.copytree(capture, tmp_path / "turned")
+    for frame in record["frames"]:
+        turned = np.array(frame["transform_matrix"]) @ np.diag([1, -1, -1, 1])
+        frame["transform_matrix"] = turned.tolist()
+    points = np.random.default_rng(0).normal(0, 0.1, (40, 3)) + MIDDLE
+    rows = "\n".join(" ".join(map(str, point)) for point in points)
+    head = "ply\nformat ascii 1.0\nelement vertex 40\n"
+    head += "".join(f"property float {axis}\n" for axis in "xyz")
+    (folder / "points.ply").write_text(f"{head}end_header\n{rows}\n")
+    write_json(folder / "transforms.json", record | {"ply_file_path": "points.ply"})
+    assert evaluate(fitted, tmp_path / "scores", folder) == 3
+    assert "the axes of their cameras are turned" in " ".join(capsys.readouterr().err.split())
+    words = ["render", str(fitted), "--path", str(folder), "--out", str(tmp_path / "film")]
+    assert main(words) == 3
+    assert "the axes of their cameras are turned" in " ".join(capsys.readouterr().err.split())
 
 
 def test_without_training_views_there_are_no_baselines(capture, fitted, tmp_path, capsys):
@@ -181,6 +257,21 @@ def test_flip_is_scored_when_asked_for(capture, fitted, tmp_path, monkeypatch):
     assert "FLIP" in (tmp_path / "scores" / "report.html").read_text()
 
 
+def test_flip_is_left_out_where_its_filters_see_pixels_that_do_not_count(
+    capture, fitted, tmp_path, monkeypatch, capsys
+):
+    module = SimpleNamespace(evaluate=lambda *pair, **more: (None, 0.25, {}))
+    monkeypatch.setitem(sys.modules, "flip_evaluator", module)
+    masked = shutil.copytree(capture, tmp_path / "masked")
+    mask = np.zeros((60, 80))
+    mask[:, 30:50] = 1
+    write_png(masked / "5_mask.png", mask)
+    assert evaluate(fitted, tmp_path / "scores", masked, "--flip") == 0
+    assert "FLIP is left out for 1 of 8 photographs" in capsys.readouterr().err
+    found = metrics_of(tmp_path / "scores")["views"]["masked"]
+    assert [number for number, v in enumerate(found) if "fit_flip" not in v] == [5]
+
+
 def test_scores_that_cannot_be_had_are_named(fitted, tmp_path, monkeypatch, capsys):
     monkeypatch.setitem(sys.modules, "flip_evaluator", None)
     assert evaluate(fitted, tmp_path / "scores", "--flip") == 3
@@ -199,6 +290,7 @@ def test_scores_that_cannot_be_had_are_named(fitted, tmp_path, monkeypatch, caps
         (("CAPTURE", "--hold-out", -1), "--hold-out is -1"),
         (("CAPTURE", "--downscale", 0), "downscale is 0"),
         (("CAPTURE", "--downscale", 100), "downscale is 100"),
+        (("CAPTURE", "--downscale", 6), "--downscale 6 leaves 13 x 10 pixels of 0.png"),
         (("nowhere",), "nowhere"),
         (("CAPTURE", "--train", "nowhere"), "nowhere"),
     ],

@@ -7,7 +7,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from skimage.metrics import structural_similarity
 from view_files import linear, store, view_of
 
 import rift_cl as rift
@@ -35,6 +34,12 @@ def opened(folder, picture, kind="uint8", mask=None, name="a.png", lens=None):
     path = store(folder / name, picture, kind, **{"oiio:UnassociatedAlpha": 1})
     where = None if mask is None else store(folder / "mask.png", mask, "uint8")
     return view_of(path, where, lens)
+
+
+def linear_inverse(light):
+    """Display light of linear light, by the curve of sRGB."""
+    curved = 1.055 * np.maximum(light, 0) ** (1 / 2.4) - 0.055
+    return np.where(light > 0.0031308, curved, 12.92 * light)
 
 
 def cut_out():
@@ -264,21 +269,25 @@ def test_every_score_is_a_mean_over_the_pixels_that_count(share):
 
     found = scores_of(image, truth, (counted, None), "fit", {"lpips": more})
     assert asked[0] is counted and set(found) == {"fit_psnr", "fit_ssim"}
-    shown = np.where(counted[..., None], image, truth)
-    maps = [
-        structural_similarity(
-            *(np.float64(a[..., c]) for a in (shown, truth)),
-            data_range=1,
-            gaussian_weights=True,
-            sigma=1.5,
-            use_sample_covariance=False,
-            full=True,
-        )[1][counted].mean()
-        for c in range(3)
-    ]
-    assert found["fit_ssim"] == pytest.approx(np.mean(maps), abs=1e-12)
+    hidden = (np.where(counted[..., None], array, 0.5) for array in (image, truth))
+    again = scores_of(*hidden, (counted, None), "fit")
+    assert again == {name: pytest.approx(value, abs=1e-12) for name, value in found.items()}
     whole = scores_of(image, truth, (None, None), "fit")
     assert found["fit_ssim"] == pytest.approx(whole["fit_ssim"], abs=0.1)
+
+
+@pytest.mark.parametrize("light", ["display", "linear"])
+def test_what_is_brighter_than_white_is_fitted_as_it_is_and_scored_as_it_is_shown(tmp_path, light):
+    bright = np.full((24, 30, 3), 0.25, np.float32)
+    bright[4:, :7], bright[4:, 7:9] = 3.5, -0.1
+    seen = pictures([opened(tmp_path, bright, "float", name="a.exr")], light=light)
+    wanted = bright if light == "linear" else linear_inverse(bright)
+    assert wanted.max() > 1.7 and wanted.min() < -0.05
+    for _ in range(2):  # As it was read, and as it was kept.
+        np.testing.assert_allclose(seen.image(0), wanted, atol=1e-5)
+        seen._last = None
+    shown = np.clip(linear_inverse(bright), 0, 1)
+    np.testing.assert_allclose(seen.shown(seen.image(0)), shown, atol=1e-5)
 
 
 def test_linear_light_is_fitted_and_shown_for_a_display(tmp_path):

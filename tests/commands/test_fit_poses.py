@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from test_start import moved, ring, survey, turned
 
+from rift_cl.commands.cameras.pose_check import check_poses
 from rift_cl.commands.cli import main
-from rift_cl.commands.fit_photos.pose_check import check_poses
 from rift_cl.commands.inputs.opened_scene import OpenedScene
 from rift_cl.commands.inputs.scene_input import SceneInput
 from rift_cl.errors import InputError

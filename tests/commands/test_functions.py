@@ -56,7 +56,8 @@ def test_cameras_of_another_program_are_no_scan(tmp_path):
 
 def test_a_result_stands_for_its_folder(fitted, capture):
     scores = rift.evaluate(fitted)
-    assert list(rift.evaluate(fitted, [capture]).scores) == [capture.name]
+    for given in ([capture], str(capture), capture):
+        assert list(rift.evaluate(fitted, given).scores) == [capture.name]
     close = pytest.approx(fitted.metrics["scores"]["held out"]["fit_psnr"], abs=1e-3)
     assert scores.metrics["scores"]["held out"]["fit_psnr"] == close
     film = rift.render(fitted, frames=3, size=(40, 30), film="apng")

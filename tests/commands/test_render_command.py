@@ -157,6 +157,19 @@ def test_a_path_has_frames_between_its_views(scene, capture, tmp_path):
     assert read_image(tmp_path / "small" / "frames" / "0003.png").shape == (12, 16, 3)
 
 
+def test_doubts_of_a_path_are_told(scene, capture, tmp_path, capsys):
+    record = json.loads((capture / "transforms.json").read_text())
+    record["frames"][1]["cx"] = 2.0
+    turned = np.array(record["frames"][2]["transform_matrix"]) @ np.diag([1, -1, -1, 1])
+    record["frames"][2]["transform_matrix"] = turned.tolist()
+    path = tmp_path / "path.json"
+    write_json(path, record)
+    assert render(scene, tmp_path / "film", "--path", path, "--size", 16, 12) == 0
+    told = " ".join(capsys.readouterr().err.split())
+    assert "the principal point of 1 of 4 photographs is far from the middle" in told
+    assert told.count("no splat is in sight of 1 of 4 views") == 1
+
+
 def test_lenses_that_distort_are_told_of(scene, capture, tmp_path, capsys):
     assert render(scene, tmp_path / "film", "--path", capture, "--dry-run") == 0
     assert "distort" not in capsys.readouterr().err

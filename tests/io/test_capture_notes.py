@@ -191,6 +191,7 @@ def test_numbers_beyond_black_and_white_are_counted_in_the_light_of_the_fit(tmp_
         (found,) = range_notes(views, downscale=1, light=light)
         assert found.startswith("25 % of the numbers")
         assert f"in {light} light, from {least:.3g} to {most:.3g}:" in found
+        assert "a fit takes them as they are" in found and "clipped" in found
     for kind, suffix in (("float", "exr"), ("uint16", "tif")):
         inside = open_capture(stored(tmp_path, suffix, kind, 1.0)).views
         assert range_notes(inside, downscale=1, light="display") == []

@@ -38,10 +38,11 @@ class Kind:
     covars: bool = False
     settings: SplatSettings = field(default_factory=SplatSettings)
     aperture: Aperture | None = field(default=None, kw_only=True)
+    focal: float | None = field(default=None, kw_only=True)
 
     @property
     def camera(self):
-        return camera_of(self.model, aperture=self.aperture)
+        return camera_of(self.model, aperture=self.aperture, focal=self.focal)
 
 
 # Blurs by up to 10 pixels, and through diffraction by as much as the tests' dilation.
@@ -77,6 +78,17 @@ def random_splats(count=400, seed=0, *, coefficients=16, wide=1.6):
         "sh": 0.4 * random.standard_normal((count, coefficients, 3)),
     }
     return {name: value.astype(np.float32) for name, value in values.items()}
+
+
+def all_round(camera, count=200, *, angles=(60, 150), seed=3):
+    """Small splats about a camera, at angles between two from its axis, in degrees."""
+    random = np.random.default_rng(seed)
+    angle, turn = np.radians(np.linspace(*angles, count)), random.uniform(0, 2 * np.pi, count)
+    ways = [np.sin(angle) * np.cos(turn), np.sin(angle) * np.sin(turn), np.cos(angle)]
+    points = random.uniform(1, 4, (count, 1)) * np.stack(ways, axis=1)
+    means = np.linalg.solve(camera.view[:3, :3], (points - camera.view[:3, 3]).T).T
+    values = random_splats(count, seed)
+    return values | {"means": means.astype(np.float32), "scales": values["scales"] / 4}
 
 
 def shaped(values, kind):

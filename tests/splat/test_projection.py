@@ -4,7 +4,16 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from projection_scenes import KINDS, Kind, changed, plain, projected_on, random_splats, twin_of
+from projection_scenes import (
+    KINDS,
+    Kind,
+    all_round,
+    changed,
+    plain,
+    projected_on,
+    random_splats,
+    twin_of,
+)
 
 from rift_cl.reference.splat_projection import covariances
 from rift_cl.splat.settings import SplatSettings
@@ -23,6 +32,22 @@ def close_calls(twin, kind):
     on_border = np.abs(edges - np.concatenate([size, 0 * size])).min(axis=1) < 1e-3
     faint = np.abs(twin.weights * 255 - 1) < 1e-4
     return whole(twin.extents) | whole(edges / (kind.settings.tile or 16)) | on_border | faint
+
+
+def test_a_fisheye_sees_beyond_a_quarter_turn_from_its_axis(device):
+    kind = Kind("fisheye", focal=22.0)
+    values = all_round(kind.camera)
+    twin, found = twin_of(values, kind), projected_on(device, values, kind)
+    sure = ~close_calls(twin, kind)
+    np.testing.assert_array_equal(found["culled"][sure], twin.culled[sure])
+    drawn = (found["culled"] == 0) & (twin.culled == 0)
+    assert drawn[:60].sum() > 40 and drawn[-60:].sum() > 40
+    away = np.linalg.norm(values["means"] - kind.camera.center, axis=1)
+    np.testing.assert_allclose(found["depths"][drawn], away[drawn], rtol=1e-5)
+    np.testing.assert_allclose(found["screen"][drawn, :2], twin.means[drawn], rtol=0, atol=2e-3)
+    conics = twin.conics[drawn]
+    error = np.linalg.norm(found["screen"][drawn, 2:5] - conics, axis=1)
+    assert (error < 1e-4 * np.linalg.norm(conics, axis=1)).all()
 
 
 @pytest.mark.parametrize("name", KINDS)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from projection_scenes import KINDS, Kind, random_splats, twin_of, upload
+from projection_scenes import KINDS, Kind, all_round, random_splats, twin_of, upload
 
 from rift_cl.cl.arithmetic import sum_columns
 from rift_cl.errors import DTypeError, ShapeError
@@ -79,6 +79,18 @@ def test_gradients_at_and_near_the_axis_of_a_fisheye(device, name):
     assert drawn.sum() > 30
     right = oracle(values, kind, sums, drawn, shaded=False)
     assert errors_by_splat(found["means"][drawn], right["means"][drawn]).max() < 2e-4
+
+
+@pytest.mark.parametrize("covars", [False, True])
+def test_gradients_near_and_beyond_a_quarter_turn_from_the_axis_of_a_fisheye(device, covars):
+    """Those of depth as well, which is the distance there."""
+    kind = Kind("fisheye", covars, focal=22.0)
+    values = all_round(kind.camera)
+    found, sums, drawn = run(device, values, kind, channels=4, depth_channel=True)
+    assert drawn.sum() > 150 and drawn[-30:].any()
+    right = oracle(values, kind, sums, drawn, depth_channel=True)
+    for what in {"means", "quats", "scales", "covars", "camera"} & set(right):
+        assert error(found[what], right[what]) < 1e-4, what
 
 
 def test_gradients_of_needles(device):

@@ -78,6 +78,24 @@ def test_depth_is_the_last_channel(device, channels):
     assert inside[seen].all()
 
 
+def test_behind_a_fisheye_the_nearer_splat_hides_the_other(device):
+    """At 120 degrees from its axis, where z falls with the distance."""
+    camera = Camera((40, 80), [[18, 0, 40], [0, 18, 20], [0, 0, 1]], np.eye(4), "fisheye")
+    way = np.array([np.sin(2 * np.pi / 3), 0, np.cos(2 * np.pi / 3)])
+    splats = Splats.upload(
+        device,
+        means=[3 * way, 2 * way],
+        quats=np.tile([1.0, 0, 0, 0], (2, 1)),
+        scales=np.full((2, 3), 0.3),
+        opacities=[0.9, 0.9],
+        colors=np.eye(2),
+    )
+    frame = Renderer(device=device).forward(splats, camera, depth="median")
+    at = device.get(frame.image)[20, round(40 + 18 * 2 * np.pi / 3)]
+    assert at[1] > 0.8 and at[0] < 0.15
+    assert at[2] == pytest.approx(2.0, rel=1e-5)
+
+
 def test_depth_of_one_splat_is_its_own(device):
     splats = Splats.upload(
         device, means=[[0, 0, 0.5]], quats=[[1, 0, 0, 0]], scales=[[1, 1, 1]], opacities=[0.9]

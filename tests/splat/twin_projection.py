@@ -88,7 +88,8 @@ def screen(means, covars, opacities, view, lens, opening=None, *, camera, settin
     if opening is not None:
         factor = factor * torch.sqrt(torch.linalg.det(sharp) / torch.linalg.det(wide))
     pixels = vmap(lambda q: _pixel(camera.model, lens, q))(points)
-    return pixels, torch.linalg.inv(wide), opacities * factor, points[:, 2]
+    depths = points.norm(dim=1) if camera.model == "fisheye" else points[:, 2]
+    return pixels, torch.linalg.inv(wide), opacities * factor, depths
 
 
 def shade(means, sh, view, model="pinhole"):

@@ -11,6 +11,10 @@
  * gsplat and inria do: far outside, the local affine map stretches a splat without bound. In
  * pixels that is px = clamp(u, -0.15 W, 1.15 W) - cx, with du = (fx, 0, -px) / z.
  *
+ * A splat's depth, by which it is culled and drawn front to back, is z, and for a fisheye |q|: its
+ * rays go round by up to half a turn, and z is no distance beyond a quarter. On the axis behind a
+ * fisheye s has no limit, and what is there is not drawn.
+ *
  * `volume` is det [du; dv; ray] with the unit ray along which J sees (its null direction): pixel
  * area times length along the ray, per unit of volume. Line integrals need it.
  * With DEFOCUS a camera has an aperture besides: see aperture.h. The camera is the same for all lanes,
@@ -97,6 +101,19 @@ static lanes3 turned_back(Camera c, lanes3 v) {
       v.x * c.turn_x.y + v.y * c.turn_y.y + v.z * c.turn_z.y,
       v.x * c.turn_x.z + v.y * c.turn_y.z + v.z * c.turn_z.z);
 }
+
+/* Depth of a point, and its gradient. */
+#if MODEL == FISHEYE
+static lanes depth_of(lanes3 q) { return root_of(dot_of(q, q)); }
+
+static void add_depth_grad(lanes3 q, lanes depth, CameraGradient *out) {
+  out->point = plus(out->point, times(depth / depth_of(q), q));
+}
+#else
+static lanes depth_of(lanes3 q) { return q.z; }
+
+static void add_depth_grad(lanes3 q, lanes depth, CameraGradient *out) { out->point.z += depth; }
+#endif
 
 #if MODEL == PINHOLE
 

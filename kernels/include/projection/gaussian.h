@@ -184,7 +184,8 @@ static lanes_int see_gaussian(
   const lanes3 point = turned(camera, g->world);
   g->point = lanes3_of(point.x + camera.shift.x, point.y + camera.shift.y, point.z + camera.shift.z);
   code = or_else(code, no_numbers(g->point), DEGENERATE);
-  code = or_else(code, (g->point.z < near_plane) | (g->point.z > far_plane), OUT_OF_DEPTH);
+  const lanes depth = depth_of(g->point);
+  code = or_else(code, (depth < near_plane) | (depth > far_plane), OUT_OF_DEPTH);
   g->screen = to_screen(camera, g->point);
   g->m0 = turned_back(camera, g->screen.du);
   g->m1 = turned_back(camera, g->screen.dv);

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import itertools
 import math
+import re
 from collections.abc import Sequence
 
 import numpy as np
@@ -17,6 +18,7 @@ from rift_cl.commands.inputs.scene_bounds import SceneBounds
 from rift_cl.errors import InputError
 from rift_cl.geometry import Aperture, Camera
 from rift_cl.geometry.pose import look_at
+from rift_cl.io.captures.view import Capture, View
 
 Floats = NDArray[np.float64]
 
@@ -78,6 +80,25 @@ def resized(camera: Camera, size: tuple[int, int]) -> Camera:
     cx = size[1] / 2 + (cx - camera.width / 2) * scale
     K = np.array([[fx * scale, 0, cx], [0, fy * scale, cy * scale], [0, 0, 1]])
     return Camera(size, K, camera.view, camera.model, camera.aperture)
+
+
+def in_film_order(capture: Capture) -> list[View]:
+    """The views in the order of a film: that of the file, or of names where it has none.
+
+    A COLMAP model lists photographs by their names, by which fits hold some of them out: frame10
+    stands before frame2. Along a film the numbers in names count.
+    """
+    if not capture.path.is_dir():
+        return list(capture.views)
+    return sorted(capture.views, key=lambda view: (_parts(view.name), view.name))
+
+
+def _parts(name: str) -> list[tuple[int, str]]:
+    """Text and numbers of a name by turns; numbers by their digits, which may be many."""
+    parts = re.split(r"([0-9]+)", name)
+    digits = [part.lstrip("0") for part in parts[1::2]]
+    parts[1::2] = digits
+    return [(len(part) if k % 2 else 0, part) for k, part in enumerate(parts)]
 
 
 def smooth_path(cameras: Sequence[Camera], between: int) -> list[Camera]:

@@ -9,9 +9,15 @@ from pathlib import Path
 from typing import Any
 
 from rift_cl.commands.cameras.fit_cameras import FitCameras, open_fit_cameras
+from rift_cl.commands.cameras.pose_check import check_sight, unseen_notes
 from rift_cl.commands.evaluate.report import eval_page
 from rift_cl.commands.evaluate.settings import EvalSettings
-from rift_cl.commands.fit_photos.comparison import compared_record, comparison_notes
+from rift_cl.commands.fit_photos.comparison import (
+    compared_record,
+    comparison_notes,
+    trained_record,
+)
+from rift_cl.commands.fit_photos.photograph_size import check_window
 from rift_cl.commands.fit_photos.pictures import CapturePictures
 from rift_cl.commands.fit_photos.scores import (
     Floats,
@@ -28,10 +34,19 @@ from rift_cl.commands.options import absolute_paths
 from rift_cl.commands.run_folder.run_folder import RunFolder
 from rift_cl.errors import InputError
 from rift_cl.io.captures.capture import View, camera_at, capture_name, holds_bare_photographs
-from rift_cl.metrics import flip
+from rift_cl.io.captures.capture_notes import range_notes
+from rift_cl.metrics import flip, flip_pixels
 from rift_cl.metrics.perceptual import flip_evaluator
 from rift_cl.progress import Report
 from rift_cl.splat.renderer import Renderer
+
+# Of what photographs a score has no meaning.
+_WHY_NOT = {
+    "flip": "whose pixels that count all lie within 10 pixels of ones that do not (a mask, or a "
+    "lens), which its filters see as well",
+    "lpips": "whose pixels do not all count (a mask, or a lens): it has no map that could be "
+    "averaged over the others",
+}
 
 
 class Evaluation:
@@ -51,6 +66,8 @@ class Evaluation:
         self.scene = settings.open_scene()
         chosen = settings.downscale
         self.downscale = self.scene.downscale if chosen is None else chosen
+        # What is to be said of the captures, and of how pictures were scored, a sentence each.
+        self.notes: list[str] = []
         self.cameras = self._cameras()
         self.groups = {capture_name(path): self._scored(path) for path in settings.captures}
         if not self.groups:
@@ -59,12 +76,14 @@ class Evaluation:
             raise InputError("two captures have the same name: rename one folder")
         self.training_views = self._training_views()
         self.more = self._more()
-        for view in [*self.training_views, *(v for views in self.groups.values() for v in views)]:
+        scored = [view for views in self.groups.values() for view in views]
+        for view in [*self.training_views, *scored]:
             camera_at(view, self.downscale)
+        check_window(scored, self.downscale)
+        if settings.captures:
+            self.notes += range_notes(scored, downscale=self.downscale, light=self.scene.light)
         self.device = settings.open_device()
         self.folder = RunFolder.of(settings, "eval")
-        # What is to be said of how pictures were scored, a sentence each.
-        self.notes: list[str] = []
         self.metrics: dict[str, Any] = {}
         self.scores: dict[str, list[ViewScore]] = {}
         # What pictures of each group are drawn over, in the scene's light.
@@ -94,7 +113,8 @@ class Evaluation:
         """The views of a capture that are scored.
 
         Raises:
-            RiftError: it cannot be read, or is the fit's own, whose photographs the fit knows.
+            RiftError: it cannot be read, its poses are not those of its points, or it is the fit's
+                own, whose photographs the fit knows.
         """
         fit, scene = self.scene.folder, self.settings.scene
         inside = fit is not None and path.resolve().is_relative_to(fit.resolve())
@@ -103,12 +123,18 @@ class Evaluation:
                 f"{path}: is no capture with photographs; to score the held-out photographs, name "
                 f"only the fit: rift eval {scene}"
             )
-        views = open_seen(path, pinhole=self.scene.pinhole).views
-        every = self.settings.hold_out
+        capture = open_seen(path, pinhole=self.scene.pinhole)
+        views, every = capture.views, self.settings.hold_out
+        check_sight([view.camera for view in views], capture.points, path)
+        self.notes += capture.notes
         return views[::every] if every else views
 
     def _training_views(self) -> tuple[View, ...]:
-        """Training views; empty if they are not known, or if they are the scored ones."""
+        """Training views; empty if they are not known.
+
+        Raises:
+            RiftError: the capture of --train cannot be read, or has photographs that are scored.
+        """
         if self.settings.train is None:
             return self._trained()
         views = open_seen(self.settings.train, pinhole=self.scene.pinhole).views
@@ -147,11 +173,11 @@ class Evaluation:
         return cameras.test_views
 
     def _trained(self) -> tuple[View, ...]:
-        """What the fit was trained on; empty where those photographs are gone, or are scored."""
+        """What the fit was trained on; empty where those photographs are gone."""
         cameras = self.cameras
         if cameras is None or not all(view.image.is_file() for view in cameras.training_views):
             return ()
-        return () if self._in_both(cameras.training_views) else cameras.training_views
+        return cameras.training_views
 
     def _in_both(self, training_views: tuple[View, ...]) -> str | None:
         """A photograph that is scored and was trained on, with its capture's name."""
@@ -176,6 +202,7 @@ class Evaluation:
             "eps2d": f"{self.scene.rendering.eps2d:g}",
             "background": self._told
             or "the common border of the scored photographs, or black without one",
+            **({"notes": "; ".join(self.notes)} if self.notes else {}),
             "scores": ", ".join(["PSNR", "SSIM", *(name.upper() for name in self.more)]),
             "device": self.device.name,
         }
@@ -197,6 +224,8 @@ class Evaluation:
         self.scores = {name: scores for name, scores in self.scores.items() if scores}
         if not self.scores:
             raise InputError(f"{self.scene.name}: every mask is black, there is nothing to score")
+        every = [score for scores in self.scores.values() for score in scores]
+        self.notes += unseen_notes(sum(score.unseen for score in every), len(every))
         self.notes += [*self._pose_notes(), *self._exposure_notes(), *self._left_out()]
         self.notes += comparison_notes(self.scores)
         self.metrics = {
@@ -206,6 +235,7 @@ class Evaluation:
             "background": {name: color.tolist() for name, color in self.backgrounds.items()},
             **score_record(self.scores),
             **compared_record(self.scores),
+            **trained_record(self.scores),
             **error_record(self.scores),
         }
         page = eval_page(self.scene.name, self.scores, self.metrics, self.notes)
@@ -248,14 +278,13 @@ class Evaluation:
         ]
 
     def _left_out(self) -> list[str]:
-        """A sentence about pictures that a score has no meaning of."""
+        """Sentences about pictures that a score has no meaning of."""
         scores = [score for group in self.scores.values() for score in group]
-        lacking = sum("fit_lpips" not in score.values for score in scores)
-        if "lpips" not in self.more or not lacking:
-            return []
+        lacking = {kind: sum(f"fit_{kind}" not in s.values for s in scores) for kind in self.more}
         return [
-            f"LPIPS is left out for {lacking} of {len(scores)} photographs, whose pixels do not "
-            "all count (a mask, or a lens): it has no map that could be averaged over the others"
+            f"{kind.upper()} is left out for {count} of {len(scores)} photographs, {_WHY_NOT[kind]}"
+            for kind, count in lacking.items()
+            if count
         ]
 
     def _pictures(
@@ -271,7 +300,9 @@ class Evaluation:
         )
 
 
-def _flip(image: Floats, truth: Floats, counted: Mask | None) -> float:
+def _flip(image: Floats, truth: Floats, counted: Mask | None) -> float | None:
+    if counted is not None and not flip_pixels(counted).any():
+        return None
     return flip(image, truth, mask=counted)
 
 

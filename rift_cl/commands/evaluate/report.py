@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from rift_cl.commands.fit_photos.error_places_report import show_error_places
-from rift_cl.commands.fit_photos.report import SCORES, score_table, show_views
+from rift_cl.commands.fit_photos.report import SCORES, angle_cell, score_table, show_views
 from rift_cl.commands.fit_photos.scores import ViewScore
 from rift_cl.report.html_page import Page
 
@@ -43,4 +43,4 @@ def _row(score: ViewScore, kinds: Sequence[str], trained: bool) -> tuple[Any, ..
     cells = (score.name, *(values.get(f"fit_{kind}") for kind in kinds))
     if not trained:
         return cells
-    return (*cells, score.angle, values.get("nearest_psnr"), values.get("blend_psnr"))
+    return (*cells, angle_cell(score), values.get("nearest_psnr"), values.get("blend_psnr"))

@@ -2,6 +2,7 @@
 
 A training picture of another size is no baseline, and PSNR is infinite where a picture is exact, as
 a blank one easily is. Means over different pictures would compare the pictures and not the fit.
+Pictures that were trained on have no baselines either: what a fit has of them is no held-out score.
 """
 
 from __future__ import annotations
@@ -55,6 +56,22 @@ def compared_record(groups: Mapping[str, Sequence[ViewScore]]) -> dict[str, Any]
     return {"compared": {name: _compared_kinds(scores) for name, scores in groups.items()}}
 
 
+def trained_record(groups: Mapping[str, Sequence[ViewScore]]) -> dict[str, Any]:
+    """Which pictures of each group were trained on, and mean scores of the others; JSON.
+
+    Empty where there are none in any group.
+    """
+    mixed = {name: scores for name, scores in groups.items() if any(s.trained for s in scores)}
+    record = {
+        name: {
+            "pictures": [score.name for score in scores if score.trained],
+            "others": mean_scores([score for score in scores if not score.trained]),
+        }
+        for name, scores in mixed.items()
+    }
+    return {"trained_on": record} if record else {}
+
+
 def _compared_kinds(scores: Sequence[ViewScore]) -> dict[str, dict[str, float]]:
     mark = f"{COMPARED[0]}_"
     names = dict.fromkeys(name for score in scores for name in score.values)
@@ -68,8 +85,28 @@ def comparison_notes(groups: Mapping[str, Sequence[ViewScore]]) -> list[str]:
     return [
         note
         for name, scores in groups.items()
-        for note in (*_size_notes(name, scores), *_exact_notes(name, scores))
+        for note in (
+            *_trained_notes(name, scores),
+            *_size_notes(name, scores),
+            *_exact_notes(name, scores),
+        )
     ]
+
+
+def _trained_notes(group: str, scores: Sequence[ViewScore]) -> list[str]:
+    trained = [score for score in scores if score.trained]
+    if not trained:
+        return []
+    others = [score for score in scores if not score.trained]
+    whole = mean_scores(scores)["fit_psnr"]
+    sentence = (
+        f"{len(trained)} of the {len(scores)} pictures of {group}, such as {trained[0].name}, were "
+        f"trained on, which flatters the {whole:.4g} dB over all of them: "
+    )
+    if not others:
+        return [f"{sentence}none is left that was held out"]
+    held_out = mean_scores(others)["fit_psnr"]
+    return [f"{sentence}the fit has {held_out:.4g} dB over the {len(others)} others"]
 
 
 def _size_notes(group: str, scores: Sequence[ViewScore]) -> list[str]:

@@ -9,12 +9,17 @@ from collections.abc import Generator, Iterator, Sequence
 from rift_cl.commands.cameras.arc import check_places, place_notes
 from rift_cl.commands.cameras.fit_cameras import CAMERA_FILES, save_fit_cameras, with_poses
 from rift_cl.commands.cameras.photograph_place import place_record
+from rift_cl.commands.cameras.pose_check import check_poses
 from rift_cl.commands.export.fit_page import leave_page
 from rift_cl.commands.fit.inputs import FitInput, photograph_inputs
 from rift_cl.commands.fit.probe import TRIED, probed, time_words
 from rift_cl.commands.fit.run import FitRun
 from rift_cl.commands.fit_photos.bare_input import BareInput
-from rift_cl.commands.fit_photos.comparison import compared_record, comparison_notes
+from rift_cl.commands.fit_photos.comparison import (
+    compared_record,
+    comparison_notes,
+    trained_record,
+)
 from rift_cl.commands.fit_photos.photograph_size import (
     check_window,
     factor_for,
@@ -22,7 +27,6 @@ from rift_cl.commands.fit_photos.photograph_size import (
     size_words,
 )
 from rift_cl.commands.fit_photos.pictures import CapturePictures
-from rift_cl.commands.fit_photos.pose_check import check_poses
 from rift_cl.commands.fit_photos.refined import (
     exposure_notes,
     exposure_record,
@@ -71,6 +75,8 @@ from rift_cl.train.trainer import Trainer
 
 # The group of photographs that the fit itself holds out.
 _HELD_OUT = "held out"
+# What to do about photographs that are smaller than SSIM's window.
+_WITHOUT_SSIM = "do without it in the loss (--ssim-weight 0) and in scores (--hold-out 0)"
 # Photographs from which the noise is estimated.
 _NOISE_VIEWS = 8
 
@@ -264,6 +270,7 @@ class Fit(FitRun[FitPhotosSettings]):
             **exposure_record(trainer, self.training_views, self.scores),
             **score_record(self.scores),
             **compared_record(self.scores),
+            **trained_record(self.scores),
             **error_record(self.scores),
         }
         ramp = ramp_notes(settings, len(self.training_views))
@@ -389,7 +396,7 @@ class Fit(FitRun[FitPhotosSettings]):
         """Make sure that SSIM can be had of all photographs that it is asked of."""
         in_loss = self.training_views if self.settings.training.ssim_weight else ()
         scored = (view for views in self._scored().values() for view in views)
-        check_window([*in_loss, *scored], self.downscale)
+        check_window([*in_loss, *scored], self.downscale, way_out=_WITHOUT_SSIM)
 
     def _tell(self, notes: Sequence[str]) -> int:
         """Say notes, and how many there were."""

@@ -36,12 +36,13 @@ def factor_for(pixels: int, device: Device) -> int:
     return max(1, math.ceil(math.sqrt(pixels / MOST_PIXELS[device.traits.is_cpu])))
 
 
-def check_window(views: Sequence[View], factor: int) -> None:
+def check_window(views: Sequence[View], factor: int, *, way_out: str = "") -> None:
     """Check that photographs are as large as the window of SSIM, before any work is done.
 
     Args:
         views: the photographs whose SSIM is in the loss or among the scores.
         factor: by which they are made smaller.
+        way_out: what may be done besides a smaller factor.
 
     Raises:
         InputError: one is smaller.
@@ -52,12 +53,11 @@ def check_window(views: Sequence[View], factor: int) -> None:
     camera, most = camera_at(smallest, factor), min(smallest.camera.size) // SSIM_WINDOW
     if factor <= most:
         return
-    larger = f"take --downscale {most}" if most == 1 else f"take --downscale {most} or less"
+    larger = f"take --downscale {most}" + (" or less" if most > 1 else "")
+    ways = ", or ".join(filter(None, [larger if most else "", way_out]))
     raise InputError(
         f"--downscale {factor} leaves {camera.width} x {camera.height} pixels of {smallest.name}, "
-        "and SSIM "
-        f"wants {SSIM_WINDOW} or more along each side: {f'{larger}, or ' if most else ''}do "
-        "without it in the loss (--ssim-weight 0) and in scores (--hold-out 0)"
+        f"and SSIM wants {SSIM_WINDOW} or more along each side{f': {ways}' if ways else ''}"
     )
 
 

@@ -1,12 +1,12 @@
 """The photographs of a fit: decoded once, sent to the device one at a time, over their background.
 
-Photographs are kept on the host, in display light as codes of 8 or 16 bits, and are decoded again
-whenever they do not fit the budget, the next step's in another thread while a step works; what a
-step sees is the same either way. Those that have alpha of their own show what was cut out: they are
-laid over a background that is drawn by chance for each step, so that transparent places must become
-transparent. Alpha that is the same everywhere, as many programs write it, cuts out nothing. Where a
-mask is black, or the photograph did not reach once its lens was undone, nothing is known, whatever
-alpha says: such pixels do not count.
+Photographs are kept on the host, in display light as codes of 8 or 16 bits where these reach all of
+their numbers, and are decoded again whenever they do not fit the budget, the next step's in another
+thread while a step works; what a step sees is the same either way. Those that have alpha of their
+own show what was cut out: they are laid over a background that is drawn by chance for each step, so
+that transparent places must become transparent. Alpha that is the same everywhere, as many programs
+write it, cuts out nothing. Where a mask is black, or the photograph did not reach once its lens was
+undone, nothing is known, whatever alpha says: such pixels do not count.
 """
 
 from __future__ import annotations
@@ -38,8 +38,8 @@ _KNOWN = 0.5
 # A border is of one colour if so many of its samples are, to within so many codes.
 _UNIFORM, _CODES = 0.8, 1.5
 
-# Values that lie so near to 8-bit codes are such.
-_EXACT = 1e-3
+# Values that lie so near to 8-bit codes are such, and that lie so little beyond 0 to 1 are rounded.
+_EXACT, _BESIDE = 1e-3, 1 / 65535
 
 Floats = NDArray[np.float32]
 Kept = NDArray[Any]
@@ -202,7 +202,10 @@ class CapturePictures:
         return None if known is None else np.asarray(known > _KNOWN)
 
     def shown(self, image: Floats) -> Floats:
-        """An image, drawn or photographed, in display light from 0 to 1: as people score it."""
+        """An image, drawn or photographed, in display light from 0 to 1: as people score it.
+
+        A screen shows no more of either, so that numbers beyond count as white and black.
+        """
         held = np.clip(image, 0, 1)
         if self.light == "linear":
             to_display(held)
@@ -325,7 +328,9 @@ def _numbers(kept: Kept) -> Floats:
 
 
 def _codes_of(image: Floats) -> Kept:
-    """Codes of 8 bits if the values are such, of 16 bits if not."""
+    """Codes of 8 bits if the values are such, else of 16 bits; what these do not reach as it is."""
+    if image.min(initial=0) < -_BESIDE or image.max(initial=0) > 1 + _BESIDE:
+        return image
     held = np.clip(image, 0, 1)
     codes = np.rint(held * 255)
     if np.abs(held * 255 - codes).max() <= _EXACT:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from functools import partial
 from itertools import compress
@@ -191,7 +192,12 @@ def show_fit(
 def _row(score: ViewScore) -> tuple[Any, ...]:
     values = score.values
     blend = values.get("blend_psnr")
-    return (score.name, score.angle, values["fit_psnr"], values["fit_ssim"], blend)
+    return (score.name, angle_cell(score), values["fit_psnr"], values["fit_ssim"], blend)
+
+
+def angle_cell(score: ViewScore) -> float | None:
+    """Degrees to the nearest training picture, for a table; None where there are none."""
+    return score.angle if math.isfinite(score.angle) else None
 
 
 def show_views(page: Page, scores: Sequence[ViewScore], what: str) -> None:

@@ -25,7 +25,7 @@ from rift_cl.commands.inputs.scene_bounds import common_up
 from rift_cl.commands.pictures.views_table import angles_of
 from rift_cl.geometry import Camera
 from rift_cl.metrics import psnr, ssim
-from rift_cl.splat.renderer import Renderer
+from rift_cl.splat.renderer import Picture, Renderer
 from rift_cl.splat.splats import Splats
 from rift_cl.train.per_view.exposures import fitted_exposure
 from rift_cl.train.start.points import focus_of
@@ -54,6 +54,9 @@ class ViewScore:
         counted: (height, width) the pixels that count; None for all.
         exposure: (2, 3) gain and offset of each colour that ``image`` was given to fit the truth;
             None where it is as it was drawn.
+        trained: whether the splats were trained on this very picture, which so has no angle, no
+            distance and no baselines.
+        unseen: whether no splat is in sight.
     """
 
     name: str
@@ -66,6 +69,8 @@ class ViewScore:
     places: ErrorPlaces | None = None
     counted: Mask | None = None
     exposure: NDArray[np.float64] | None = None
+    trained: bool = False
+    unseen: bool = False
 
 
 def score_views(
@@ -88,17 +93,17 @@ def score_views(
         splats: what is scored.
         test: the pictures.
         training: those that were trained on; without them there are no angles, no distances and no
-            baselines.
+            baselines. Pictures of ``test`` that are among them have none either.
         more: scores by name besides PSNR and SSIM.
         given: cameras of ``test`` as they were given, where it has others.
         exposed: whether what is drawn is given the gains and offsets that fit the picture best.
     """
     cameras = (training or test).cameras
     behind, focus, up = test.behind, focus_of(cameras), common_up(cameras)
+    trained_on = {view.image.resolve() for view in training.views} if training else set()
 
-    def drawn(camera: Camera) -> Floats:
-        background = renderer.device.array(behind)
-        return renderer.picture(splats, camera, background=background).image
+    def drawn(camera: Camera) -> Picture:
+        return renderer.picture(splats, camera, background=renderer.device.array(behind))
 
     for number, camera in enumerate(test.cameras):
         counted, foreground = test.counted(number), test.foreground(number)
@@ -110,9 +115,9 @@ def score_views(
             continue
         # A lens may well leave nothing out.
         masks = None if counted is None or counted.all() else counted, foreground
-        photograph, image, exposure = test.over(number, behind), drawn(camera), None
+        photograph, (image, rest), exposure = test.over(number, behind), drawn(camera), None
         truth = test.shown(photograph)
-        plain = image if given is None else drawn(given[number])
+        plain = image if given is None else drawn(given[number]).image
         if exposed:
             exposure = fitted_exposure(image, photograph, masks[0])
             image = (exposure[0] * image + exposure[1]).astype(np.float32)
@@ -120,7 +125,8 @@ def score_views(
         values, angle, distance = scores_of(image, truth, masks, "fit", more), math.nan, math.nan
         if exposed or given is not None:
             values |= scores_of(test.shown(plain), truth, masks, "given", more)
-        if training is not None:
+        trained = test.views[number].image.resolve() in trained_on
+        if training is not None and not trained:
             angles = _angles(training.cameras, camera, focus)
             angle, distance = float(angles.min()), _distance(training.cameras, camera, focus)
             for name, blend in _baselines(training, angles, truth.shape, behind).items():
@@ -128,9 +134,9 @@ def score_views(
         elevation = math.nan if up is None else angles_of(camera, focus, up)[1]
         places = ErrorPlaces.of(image, truth, *masks)
         name = test.views[number].name
-        yield ViewScore(
-            name, angle, values, truth, image, elevation, distance, places, masks[0], exposure
-        )
+        where = (elevation, distance, places, masks[0])
+        unseen = bool(rest.min() >= 1)
+        yield ViewScore(name, angle, values, truth, image, *where, exposure, trained, unseen)
 
 
 def scores_of(
@@ -142,8 +148,7 @@ def scores_of(
 ) -> dict[str, float]:
     """PSNR and SSIM of all that counts, and PSNR of the foreground, where there is one.
 
-    Maps of SSIM and FLIP are averaged over the pixels that count. Their windows find the truth in
-    the others, so that nothing that is drawn there changes a score.
+    Nothing that is drawn or photographed at the others changes a score.
 
     Args:
         image: (height, width, C) what is scored.
@@ -154,8 +159,6 @@ def scores_of(
         more: further scores of all that counts.
     """
     counted, foreground = masks
-    if counted is not None:
-        image = np.where(counted[..., None], image, truth)
     channels = range(truth.shape[2])
     values = {
         f"{name}_psnr": psnr(image, truth, mask=_of_samples(counted, truth)),

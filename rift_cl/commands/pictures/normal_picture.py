@@ -65,5 +65,8 @@ def shortest_axes(scene: SplatScene) -> NDArray[np.float64]:
 
 
 def normal_picture(normals: Floats, alpha: Floats) -> Floats:
-    """Colours of (height, width, 3) normals in display light, dark as alpha is."""
+    """Colours of (height, width, 3) normals in display light, as dark as alpha is low.
+
+    Whoever wants to compute with normals has them of length one beside the picture.
+    """
     return np.asarray((normals + 1) / 2 * alpha[..., None], np.float32)

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rift_cl.cl.budget import format_bytes
-from rift_cl.commands.cameras.camera_path import opened, resized, smooth_path
+from rift_cl.commands.cameras.camera_path import in_film_order, opened, resized, smooth_path
 from rift_cl.commands.cameras.film_path import (
     capture_arc,
     farthest_from_cameras,
@@ -21,6 +21,7 @@ from rift_cl.commands.cameras.film_path import (
     frame_of,
     orbit_place,
 )
+from rift_cl.commands.cameras.pose_check import check_sight, unseen_notes
 from rift_cl.commands.cameras.subject import subject_of
 from rift_cl.commands.inputs.opened_scene import in_display_light
 from rift_cl.commands.inputs.scene_depth import depth_maps
@@ -68,7 +69,9 @@ class Render:
         self.scene = settings.open_scene()
         self.bounds = settings.bounds(self.scene)
         self.device = settings.open_device()
-        self._lens_notes: tuple[str, ...] = ()
+        # What is to be said of --path, and how many frames show no splat.
+        self._path_notes: tuple[str, ...] = ()
+        self._unseen = 0
         cameras = self._path() if settings.path is not None else self._film()
         self.cameras = [
             opened(camera, settings.aperture, settings.focus, self.bounds.center)
@@ -90,7 +93,8 @@ class Render:
     def notes(self) -> tuple[str, ...]:
         """Assumptions, a sentence each."""
         named = self.settings.path is not None
-        notes = self._lens_notes if named else self.settings.notes(self.scene)
+        notes = self._path_notes if named else self.settings.notes(self.scene)
+        notes = (*notes, *unseen_notes(self._unseen, len(self.cameras)))
         if self.settings.film != "auto" or self._kind != "apng" or films_can_be_written():
             return notes
         return (
@@ -174,9 +178,11 @@ class Render:
 
     def _path(self) -> list[Camera]:
         settings = self.settings
-        views = self._named().views
-        self._lens_notes = _lens_notes(views)
+        capture = self._named()
+        views = in_film_order(capture)
         cameras = [view.camera for view in views]
+        check_sight(cameras, capture.points, Path(settings.path or ""))
+        self._path_notes = (*capture.notes, *_lens_notes(views))
         if settings.size is not None:
             cameras = [resized(camera, settings.size[::-1]) for camera in cameras]
         if len(cameras) + settings.between * (len(cameras) - 1) > MOST_FRAMES:
@@ -238,6 +244,7 @@ class Render:
                 pictures = self._kept(number)
                 if not pictures:
                     image, seen = renderer.picture(splats, camera, background=behind, depth=depth)
+                    self._unseen += bool(seen.min() >= 1)
                     pictures = self._save(number, image, seen, window)
                     if normals is not None:
                         pictures.append(self._save_normals(number, *normals.seen(camera)))

@@ -32,9 +32,10 @@ class CameraOptions:
     group: ClassVar[str] = "camera"
 
     path: Auto[Path] = None
-    """Render the views of this capture (a transforms.json, a COLMAP model, or a fit), in its order,
-    instead of a film. With --between, the key_frames.json of an earlier film, edited, gives
-    another film."""
+    """Render the views of this capture (a transforms.json, a COLMAP model, a fit, or a camera path
+    of nerfstudio), in its order, instead of a film; those of a COLMAP model by their names, in
+    which frame2 comes before frame10. With --between, the key_frames.json of an earlier film,
+    edited, gives another film."""
     between: int = 0
     """Number of frames to interpolate between consecutive views of --path."""
     frames: Auto[int] = None
@@ -77,7 +78,8 @@ class FrameOutput:
     """Also write the expected depth along the camera's axis, in scene units."""
     normals: bool = False
     """Also write normals, in the scene's axes: the splats' shortest axes on the side that is seen,
-    which tell of a surface where splats are flat (rift fit photos --surface.normal-consistency)."""
+    which tell of a surface where splats are flat (rift fit photos --surface.normal-consistency): of
+    length 1 as OpenEXR, and as a PNG that is dark where little covers a pixel."""
 
 
 @dataclass(frozen=True)

@@ -55,7 +55,8 @@ def open_capture(
         images: the folder of the photographs, or the one that has them in ``images``, where a
             COLMAP model lies somewhere else; masks lie in ``masks`` there.
         photographs: whether they have to be there; without them, views can be counted with but
-            not read, and a ``transforms.json`` must say how large they are.
+            not read, and a ``transforms.json``, which may then be a camera path of nerfstudio,
+            must say how large they are.
 
     Returns:
         Views in the order of the file, or in that of their names where they are COLMAP's.

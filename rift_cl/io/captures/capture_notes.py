@@ -170,9 +170,9 @@ def range_notes(views: Sequence[View], *, downscale: int, light: LightKind) -> l
         return []
     share = 100 * np.count_nonzero((found < 0) | (found > 1)) / found.size
     return [
-        f"{share:.2g} % of the numbers of floating-point photographs lie beyond 0 to 1 in {light} "
-        f"light, from {least:.3g} to {most:.3g}: they are fitted and scored as they are, with 1 as "
-        "the peak of PSNR"
+        f"{share:.3g} % of the numbers of floating-point photographs lie beyond 0 to 1 in {light} "
+        f"light, from {least:.3g} to {most:.3g}: a fit takes them as they are, scores take them as "
+        "a screen shows them, clipped to 0 to 1 in display light"
     ]
 
 

@@ -6,7 +6,9 @@ lens have their names, or stand in the list 'distortion_params' of nerfstudio, w
 'fisheye_crop_radius' is the circle that a fisheye fills. A lens with an opening has
 'aperture_radius', 'focus_distance' (without it the focus is at infinity) and 'wavelength', in the
 poses' unit. Fields that say nothing about where and through what lens a photograph was taken are
-left alone, but for nerfstudio's lists of what is trained on and scored.
+left alone, but for nerfstudio's lists of what is trained on and scored. Where photographs need not
+be there, as along the path of a film, frames need not name one, and may be those of
+``nerfstudio_path``.
 """
 
 from __future__ import annotations
@@ -23,6 +25,7 @@ from rift_cl.geometry.camera import Camera
 from rift_cl.geometry.lens_distortion import LENS_MODELS, lens_of
 from rift_cl.io.captures.capture_notes import mask_notes
 from rift_cl.io.captures.capture_paths import CaptureFolder, mask_of
+from rift_cl.io.captures.nerfstudio_path import as_transforms, is_camera_path
 from rift_cl.io.captures.point_cloud import read_point_cloud
 from rift_cl.io.captures.poses import rigid_error, view_of_opengl
 from rift_cl.io.captures.split_lists import split_by_lists
@@ -62,10 +65,12 @@ def open_transforms(
         photographs: whether they have to be there.
         images: where the photographs are, if not beside the file.
     """
-    top = read_json_object(path)
+    top = _cameras_in(path, photographs=photographs)
     folder = CaptureFolder(path.parent, complete=photographs)
     place = folder if images is None else replace(images, complete=photographs)
     frames = list(top.objects("frames"))
+    if not photographs:
+        frames = [_named(frame, number) for number, frame in enumerate(frames)]
     # Where some masks are named, those that are not named are not meant.
     by_name = all(frame.values.get("mask_path") is None for frame in frames)
     views = [_view(place, frame, top, by_name) for frame in frames]
@@ -82,6 +87,30 @@ def open_transforms(
         return Capture(checked, None, None, path, notes=notes)
     points, colors = read_point_cloud(folder.file(f"{path}: 'ply_file_path'", ply))
     return Capture(checked, points, colors, path, notes=notes)
+
+
+def _cameras_in(path: Path, *, photographs: bool) -> Fields:
+    """The file's object, as a transforms.json.
+
+    Raises:
+        InputError: it is a path of cameras, and photographs are wanted.
+    """
+    top = read_json_object(path)
+    if not is_camera_path(top):
+        return top
+    if photographs:
+        raise InputError(
+            f"{path}: is a camera path of nerfstudio, which has no photographs: 'rift render "
+            "--path' draws its frames"
+        )
+    return as_transforms(top)
+
+
+def _named(frame: Fields, number: int) -> Fields:
+    """A frame with the name of a photograph, which is not there if none is said."""
+    if "file_path" in frame:
+        return frame
+    return Fields(frame.where, {**frame.values, "file_path": f"frame {number:04}"})
 
 
 def _center_notes(path: Path, views: Sequence[View]) -> list[str]:

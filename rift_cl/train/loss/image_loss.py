@@ -32,9 +32,9 @@ _MAPS_ROOM = 1 << 24
 class ImageLoss:
     """The mean of ``m ((1 - w) |image - target| + w (1 - SSIM))``, with the weights m.
 
-    SSIM is that of ``rift_cl.metrics.ssim``, channel by channel: a Gaussian window 11 pixels wide
-    with sigma 1.5, population covariance, data range 1, mirrored borders. The mean is over all
-    pixels and channels, so that a mask shrinks the loss.
+    SSIM is that of ``rift_cl.metrics.ssim`` without a mask, channel by channel: a Gaussian window
+    11 pixels wide with sigma 1.5, population covariance, data range 1, mirrored borders. The mean
+    is over all pixels and channels, so that a mask shrinks the loss.
 
     Args:
         ssim_weight: w, from 0 (no SSIM) to 1 (nothing else).
@@ -71,7 +71,8 @@ class ImageLoss:
             image: (height, width, D); channels behind those of the target do not count.
             target: (height, width, C), at most 4 channels.
             weights: m, (height, width), from 0 to 1; one if not given. They weigh the map of
-                SSIM: pixels that do not count still stand in the windows of those that do.
+                SSIM: pixels that do not count still stand in the windows of those that do, unlike
+                in ``metrics.ssim``, so that the gradient is not zero up to 5 pixels from these.
 
         Returns:
             The loss, (1,), and its gradient by the image, (height, width, D). Values are taken

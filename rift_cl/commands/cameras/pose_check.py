@@ -52,6 +52,15 @@ def check_poses(cameras: Sequence[Camera], points: NDArray[np.float32] | None, w
         InputError: they do not.
     """
     _check_offset(cameras, where)
+    check_sight(cameras, points, where)
+
+
+def check_sight(cameras: Sequence[Camera], points: NDArray[np.float32] | None, where: Path) -> None:
+    """Check that cameras look at the sparse points that came with them.
+
+    Of cameras that a scene is drawn from the digits of places do not matter, since the scene has
+    its own. Arguments and errors are those of ``check_poses``.
+    """
     if points is None or not len(points):
         return
     few = [cameras[number] for number in evenly(len(cameras), _CAMERAS)]
@@ -67,6 +76,21 @@ def check_poses(cameras: Sequence[Camera], points: NDArray[np.float32] | None, w
         f"{where}: half of the photographs show at most {100 * share:.1f} % of the sparse points: "
         + (reason or "check the poses, the intrinsics, and that the points belong to them")
     )
+
+
+def unseen_notes(unseen: int, views: int) -> list[str]:
+    """A sentence about views that show nothing of a scene.
+
+    Args:
+        unseen: how many have no splat in sight.
+        views: how many there are.
+    """
+    if not unseen:
+        return []
+    return [
+        f"no splat is in sight of {unseen} of {views} views: check that poses and intrinsics are "
+        "those of this scene, in its frame and its unit"
+    ]
 
 
 def _check_offset(cameras: Sequence[Camera], where: Path) -> None:
