@@ -146,6 +146,32 @@ def test_a_scan_that_was_moved_or_touched_is_the_same(tmp_path, monkeypatch, cap
     assert "complete already" in capsys.readouterr().err
 
 
+def test_a_scan_that_changes_while_it_is_read_gives_no_volume(tmp_path, monkeypatch, capsys):
+    folder, out, save = tiff_scan(tmp_path / "scan"), tmp_path / "out", SlabFolder.save
+    arguments = ("reconstruct", folder, "--center", 11.5, "--out", out)
+    frame = folder / "proj_0003.tif"
+    written = frame.read_bytes()
+
+    def changed(self, start, slices):
+        save(self, start, slices)
+        (tmp_path / "other.tif").write_bytes(written[:-1] + bytes([written[-1] ^ 1]))
+        (tmp_path / "other.tif").replace(frame)
+
+    monkeypatch.setattr("rift_cl.commands.reconstruct.inversion._SLAB", 1)
+    with monkeypatch.context() as patch:
+        patch.setattr(SlabFolder, "save", changed)
+        assert run(*arguments) == INPUT
+    assert f"{folder}: was changed while it was read" in capsys.readouterr().err
+    assert not (out / "slices").exists()
+    assert run(*arguments, "--resume") == INPUT
+    # What was kept is of the scan as it was.
+    frame.write_bytes(written)
+    assert run(*arguments, "--resume") == 0
+    assert run(*arguments[:-1], tmp_path / "whole") == 0
+    whole, found = (read_volume(each / "slices") for each in (tmp_path / "whole", out))
+    assert found.tobytes() == whole.tobytes()
+
+
 def test_other_angles_make_another_scan(tmp_path, monkeypatch, capsys):
     folder = tiff_scan(tmp_path / "scan")
     (folder / "angles.txt").write_text("\n".join(str(20 * k) for k in range(8)))

@@ -137,6 +137,8 @@ class XrayFit(FitRun[FitXraySettings]):
 
     def _inputs(self) -> list[FitInput]:
         found = scan_inputs(self.settings, self.input.scan.files, self.settings.out)
+        # After the projections were read and their files looked at again.
+        self.input.watched.check()
         return found
 
     def _read(self) -> Projections:

@@ -202,6 +202,7 @@ class ConeInput:
             InputError: the scan was changed since it was opened.
         """
         found = self.clean.read(first, self.scan.shape[1] if stop is None else stop)
+        self.watched.check()
         return found
 
     def identity(self) -> dict[str, Any]:

@@ -345,6 +345,7 @@ class ConeReconstruction(TalliedRun):
                 yield from self.work_on(self.kept.missing(), assembly.keep)
             else:
                 yield from spread(self, workers, assembly)
+            self.source.watched.check()
             assembly.complete()
         return assembly
 

@@ -165,6 +165,7 @@ class Reconstruction(TalliedRun):
                     self.kept.begin(self._facts(), self.inversion.projection)
                 with self._assembly() as assembly:
                     yield from self._work(workers, assembly)
+                    self.source.watched.check()
                     assembly.complete()
             except BaseException as error:
                 if not self._keep_what_is_done():
@@ -361,6 +362,8 @@ class Reconstruction(TalliedRun):
                 report = next(steps)
             except StopIteration as end:
                 slices: Floats = end.value
+                # Before they are kept: what is kept is of the scan as it was opened.
+                self.source.watched.check()
                 return slices
             yield Report(done + report.done, self._total, self._what, report.values)
 
