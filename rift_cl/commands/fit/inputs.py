@@ -6,6 +6,7 @@ By contents and not by times of change: a capture that was copied, or fetched ag
 from __future__ import annotations
 
 import hashlib
+import os
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -56,7 +57,8 @@ def scan_inputs(settings: Any, files: Sequence[Path], out: Path) -> list[FitInpu
     Raises:
         FileFormatError: a file cannot be read.
     """
-    named = [path for each in files_read(settings) for path in files_of(each, out.resolve())]
+    own = Path(os.path.realpath(out))
+    named = [path for each in files_read(settings) for path in files_of(each, own)]
     once = {path.resolve(): path for path in (*named, *files)}
     return [FitInput(str(path), _digest_of_files(path)) for path in once.values()]
 

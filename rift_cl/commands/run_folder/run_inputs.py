@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
@@ -39,7 +40,7 @@ def input_contents(settings: Any, out: Path) -> dict[str, Any]:
     """
     found: dict[str, Any] = decisive_parts()
     for name, path, part in named_files(settings):
-        content = Content.of(files_of(path, out.resolve()), path)
+        content = Content.of(files_of(path, Path(os.path.realpath(out))), path)
         # An option may name several.
         key = name if name not in found else f"{name} ({sum(k.startswith(name) for k in found)})"
         found[key] = {**content.record(), "words": content.words + part}
