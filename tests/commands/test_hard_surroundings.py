@@ -2,9 +2,14 @@
 
 from __future__ import annotations
 
+import os
 
+import pytest
+import tiff_files as made
 
 from rift_cl.commands.cli import main
+from rift_cl.errors import InputError
+from rift_cl.io import open_scan
 
 OUTPUT = 5
 
@@ -15,3 +20,17 @@ def test_an_output_that_is_links_in_a_circle_is_told(scan, tmp_path, capsys):
     words = ["reconstruct", str(scan.counts), "--center", "45", "--out", str(tmp_path / "a")]
     assert main(words) == OUTPUT
     assert f"{tmp_path / 'a'}: cannot be written" in capsys.readouterr().err
+
+
+def test_a_geometry_that_is_a_pipe_is_there(scan, tmp_path):
+    os.mkfifo(tmp_path / "pipe.json")
+    with pytest.raises(InputError, match=r"pipe\.json.* is no file"):
+        open_scan(scan.counts, geometry=str(tmp_path / "pipe.json"))
+
+
+def test_a_frame_that_is_a_pipe_is_there(tmp_path):
+    folder = made.write_series(tmp_path / "scan", "proj_{:04}.tif", made.frames(8))
+    (folder / "proj_0003.tif").unlink()
+    os.mkfifo(folder / "proj_0003.tif")
+    with pytest.raises(InputError, match=r"proj_0003\.tif.* is no file"):
+        open_scan(folder)
