@@ -7,8 +7,9 @@ import os
 import pytest
 import tiff_files as made
 
+from rift_cl.cl import discovery
 from rift_cl.commands.cli import main
-from rift_cl.errors import InputError
+from rift_cl.errors import InputError, NoDeviceError
 from rift_cl.io import open_scan
 
 OUTPUT = 5
@@ -34,3 +35,10 @@ def test_a_frame_that_is_a_pipe_is_there(tmp_path):
     os.mkfifo(folder / "proj_0003.tif")
     with pytest.raises(InputError, match=r"proj_0003\.tif.* is no file"):
         open_scan(folder)
+
+
+def test_a_variable_that_hides_devices_is_named(monkeypatch):
+    monkeypatch.setattr(discovery, "devices", list)
+    monkeypatch.setenv("POCL_DEVICES", "none")
+    with pytest.raises(NoDeviceError, match="POCL_DEVICES=none"):
+        discovery.open_device()
