@@ -9,6 +9,7 @@ import tiff_files as made
 
 from rift_cl.cl import discovery
 from rift_cl.commands.cli import main
+from rift_cl.commands.console_table import print_table
 from rift_cl.errors import InputError, NoDeviceError
 from rift_cl.io import open_scan
 
@@ -42,3 +43,9 @@ def test_a_variable_that_hides_devices_is_named(monkeypatch):
     monkeypatch.setenv("POCL_DEVICES", "none")
     with pytest.raises(NoDeviceError, match="POCL_DEVICES=none"):
         discovery.open_device()
+
+
+def test_a_terminal_of_no_columns_shows_tables(monkeypatch, capsys):
+    monkeypatch.setenv("COLUMNS", "0")
+    print_table(("what", "value"), [("psnr", 31.5)])
+    assert "31.5" in capsys.readouterr().out
