@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import logging
 import os
+from pathlib import Path
 
 import pytest
 import tiff_files as made
@@ -10,6 +12,7 @@ import tiff_files as made
 from rift_cl.cl import discovery
 from rift_cl.commands.cli import main
 from rift_cl.commands.console_table import print_table
+from rift_cl.commands.runner import exit_status
 from rift_cl.errors import InputError, NoDeviceError
 from rift_cl.io import open_scan
 
@@ -49,3 +52,17 @@ def test_a_terminal_of_no_columns_shows_tables(monkeypatch, capsys):
     monkeypatch.setenv("COLUMNS", "0")
     print_table(("what", "value"), [("psnr", 31.5)])
     assert "31.5" in capsys.readouterr().out
+
+
+def test_a_tilde_that_no_shell_expanded_is_the_home(tmp_path, monkeypatch, capsys):
+    monkeypatch.setenv("HOME", str(tmp_path / "home"))
+    monkeypatch.chdir(tmp_path)
+    assert main(["render", "~/none.ply", "--out=~/a"]) == 3
+    assert str(tmp_path / "home" / "none.ply") in capsys.readouterr().err
+    assert not Path("~").exists()
+
+
+def test_what_matplotlib_says_of_its_folders_is_not_shown():
+    log = logging.getLogger("matplotlib.font_manager")
+    assert exit_status(lambda: int(log.isEnabledFor(logging.WARNING))) == 0
+    assert exit_status(lambda: int(log.isEnabledFor(logging.ERROR))) == 1
