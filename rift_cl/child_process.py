@@ -73,8 +73,9 @@ def answer_requests(answer: Callable[[dict[str, Any]], tuple[dict[str, Any], Buf
     """
     # Ctrl-C, and what batch systems send to all processes, is for the process that asks; it ends
     # this one by closing the input.
-    for each in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(each, signal.SIG_IGN)
+    for each in ("SIGINT", "SIGTERM", "SIGHUP"):
+        if hasattr(signal, each):
+            signal.signal(getattr(signal, each), signal.SIG_IGN)
     answers = os.fdopen(os.dup(1), "wb")
     os.dup2(2, 1)
     while (request := read_message(sys.stdin.buffer)) is not None:

@@ -266,7 +266,7 @@ def _read_slabs(path: Path) -> str:
 
     kept = SlabFolder(path, (4, 5, 6))
     kept.projection(), kept.axis()
-    kept.go_on({"scan": "a", "axis": "2.5", "tilt of the axis": "0"})
+    kept.go_on({"rows": "a", "axis": "2.5", "tilt of the axis": "0"})
     return "" if sum(len(slab) for _, slab in kept.slabs()) == kept.done else "slices are missing"
 
 

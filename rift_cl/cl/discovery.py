@@ -24,6 +24,11 @@ _INSTALL = (
     "install a driver: your GPU vendor's OpenCL package, or on Linux x86-64 a CPU driver from "
     "PyPI with: pip install 'pyopencl[pocl]'"
 )
+# Variables by which drivers and their loader leave devices out.
+_HIDING = (
+    *("POCL_DEVICES", "OCL_ICD_VENDORS", "OCL_ICD_FILENAMES", "OPENCL_VENDOR_PATH"),
+    *("CUDA_VISIBLE_DEVICES", "GPU_DEVICE_ORDINAL", "ROCR_VISIBLE_DEVICES", "ZE_AFFINITY_MASK"),
+)
 _enumerating = threading.Lock()
 _RANKS = ("GPU", "CPU", "accelerator")
 # A driver that calls itself by a long name is asked for by the short one.
@@ -66,6 +71,12 @@ def _of(number: int, platform: Any) -> list[Device]:
         return []
 
 
+def _hidden() -> str:
+    """What may hide devices that are there, for a sentence; empty if nothing does."""
+    found = [f"{name}={os.environ[name]}" for name in _HIDING if name in os.environ]
+    return f"unset {', '.join(found)}, which may hide what is there, or " if found else ""
+
+
 def open_device(selector: str | None = None, memory: int | None = None) -> Device:
     """Choose a device.
 
@@ -79,7 +90,7 @@ def open_device(selector: str | None = None, memory: int | None = None) -> Devic
     """
     found = devices()
     if not found:
-        raise NoDeviceError(f"no OpenCL device was found: {_INSTALL}")
+        raise NoDeviceError(f"no OpenCL device was found: {_hidden()}{_INSTALL}")
     selector = selector or os.environ.get("RIFT_DEVICE")
     fitting = _fitting(found, selector) if selector else by_rank()
     if not fitting:

@@ -8,6 +8,9 @@ from typing import Any
 from rich.console import Console
 from rich.table import Table
 
+# Columns of a terminal whose width is not known.
+_WIDTH = 80
+
 
 def print_table(
     columns: Sequence[str], rows: Iterable[Sequence[Any]], *, caption: str = ""
@@ -16,7 +19,10 @@ def print_table(
     table = Table(*columns, caption=caption or None, caption_justify="left")
     for row in rows:
         table.add_row(*map(_text, row))
-    Console().print(table)
+    console = Console()
+    # Some shells and schedulers say that a terminal has no columns: they know of none.
+    console.width = console.width or _WIDTH
+    console.print(table)
 
 
 def _text(cell: Any) -> str:

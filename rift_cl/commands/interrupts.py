@@ -1,4 +1,4 @@
-"""Ctrl-C and a batch system's SIGTERM: what has a state to keep is asked to stop first.
+"""Ctrl-C, SIGTERM, a lost terminal: what has a state to keep is asked to stop first.
 
 Handlers belong to the main thread. What runs in another hears nothing, and is broken off as usual.
 """
@@ -13,15 +13,30 @@ from types import FrameType
 
 from rift_cl.commands.progress_bar import print_line
 
-# What ends a command from outside.
-ENDING = (signal.SIGINT, signal.SIGTERM)
+
+def ending() -> tuple[signal.Signals, ...]:
+    """What ends a command from outside; the end of its terminal unless nohup has it ignored."""
+    return (signal.SIGINT, *sent())
+
+
+def sent() -> tuple[signal.Signals, ...]:
+    """The same but for Ctrl-C, for which Python has a handler."""
+    hung_up = getattr(signal, "SIGHUP", None)  # not on Windows
+    if hung_up is None or signal.getsignal(hung_up) is signal.SIG_IGN:
+        return (signal.SIGTERM,)
+    return (signal.SIGTERM, hung_up)
 
 
 @contextmanager
 def gentle_interrupt(
-    stop: Callable[[], None], signals: Iterable[signal.Signals] = ENDING
+    stop: Callable[[], None], signals: Iterable[signal.Signals] | None = None
 ) -> Iterator[None]:
-    """Call ``stop`` at the first of the signals; the second breaks off at once, as usual."""
+    """Call ``stop`` at the first of the signals; the second breaks off at once, as usual.
+
+    Args:
+        stop: asks for the end.
+        signals: those that are heeded; all that end a command if None.
+    """
     with ExitStack() as usual:
 
         def heard(number: int, frame: FrameType | None) -> None:
@@ -29,7 +44,7 @@ def gentle_interrupt(
             stop()
             print_line("rift: stopping after this step; a second Ctrl-C or SIGTERM stops at once")
 
-        usual.enter_context(heeded(signals, heard))
+        usual.enter_context(heeded(ending() if signals is None else signals, heard))
         yield
 
 

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import Field, dataclass, fields, is_dataclass, replace
 from pathlib import Path
 from typing import (
@@ -178,6 +179,48 @@ def absolute_files(settings: S) -> S:
         if (value := getattr(settings, name, None)) is not None and Path(value).exists()
     }
     return replace(absolute_paths(settings), **changed)  # type: ignore[type-var]
+
+
+class NamedFile(NamedTuple):
+    """What the value of an option names.
+
+    Args:
+        path: a file or folder that is there.
+        part: what of it is meant, such as ``:/exchange/data_white``; empty where it is all.
+    """
+
+    path: Path
+    part: str
+
+
+def named_file(name: str, value: Any) -> NamedFile | None:
+    """The file or folder that an option names; None where it names none that is there.
+
+    Args:
+        name: of the option.
+        value: of the option, or one of several.
+    """
+    if isinstance(value, Path):
+        return NamedFile(value, "") if _is_data(value) else None
+    if name not in MAY_BE_FILES or not isinstance(value, str) or not value:
+        return None
+    if _is_data(Path(value)):
+        return NamedFile(Path(value), "")
+    file, colon, part = value.rpartition(":")
+    return NamedFile(Path(file), colon + part) if file and _is_data(Path(file)) else None
+
+
+def without_place(name: str, value: Any) -> Any:
+    """The value of an option but for where the file is that it names, where it names one."""
+    named = named_file(name, value)
+    return value if named is None else f"a file{named.part}"
+
+
+def _is_data(path: Path) -> bool:
+    # A text that names a part of the scan may be no path at all.
+    with suppress(OSError, ValueError):
+        return path.is_file() or path.is_dir()
+    return False
 
 
 class ShownOption(NamedTuple):

@@ -2,17 +2,18 @@
 
 Exit statuses: 0 ok, 2 usage (an unknown option, or no number where one is wanted), 3 input (a file
 or a value that cannot be used), 4 device, 5 output, 130 interrupted (also a run that keeps
-what it has done at SIGTERM), 143 ended by SIGTERM with nothing kept.
+what it has done at SIGTERM or SIGHUP), 143 ended by SIGTERM with nothing kept, 129 by SIGHUP.
 """
 
 from __future__ import annotations
 
+import logging
 import os
-import signal
 import sys
 import traceback
 import warnings
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, field, make_dataclass
 from inspect import Parameter, Signature
 from pathlib import Path
@@ -22,7 +23,7 @@ from typing import Annotated, Any, Literal, NamedTuple, get_args, get_origin
 import tyro
 
 from rift_cl.commands.console_table import print_table
-from rift_cl.commands.interrupts import heeded
+from rift_cl.commands.interrupts import heeded, sent
 from rift_cl.commands.options import MISSING, ShownOption, assembled, shown_options
 from rift_cl.commands.progress_bar import print_line, show_progress
 from rift_cl.errors import RiftError, SettingError
@@ -31,7 +32,9 @@ from rift_cl.progress import Report
 
 # What Python says where the system gives it no thread.
 _NO_THREAD = "can't start new thread"
-_INPUT, _DEVICE, _OUTPUT, _INTERRUPTED, _TERMINATED = 3, 4, 5, 130, 143
+_INPUT, _DEVICE, _OUTPUT, _INTERRUPTED = 3, 4, 5, 130
+# A shell says by 128 and its number which signal ended a command.
+_SIGNALLED = 128
 # Options have names of their own, whichever group they are in.
 _OMITTED: Any = tyro.conf.OmitArgPrefixes
 # Options in no group, which the help lists under tyro's own title.
@@ -51,18 +54,26 @@ class Output:
 
 
 class Terminated(KeyboardInterrupt):
-    """SIGTERM: a batch system's Ctrl-C, which it sends before it kills."""
+    """SIGTERM, which a batch system sends before it kills, or SIGHUP, when a terminal is lost.
+
+    Args:
+        number: of the signal.
+    """
+
+    def __init__(self, number: int) -> None:
+        super().__init__()
+        self.status = _SIGNALLED + number
 
 
 def exit_status(run: Callable[[], int]) -> int:
     """Run a command line; what ends it from outside becomes a sentence and an exit status."""
     try:
-        with heeded((signal.SIGTERM,), _terminate):
+        with heeded(sent(), _terminate), _quiet_matplotlib():
             status = run()
         if sys.stdout is not None:
             sys.stdout.flush()
     except KeyboardInterrupt as end:
-        ended = _TERMINATED if isinstance(end, Terminated) else _INTERRUPTED
+        ended = end.status if isinstance(end, Terminated) else _INTERRUPTED
         return _say("rift: interrupted; no file is half-written", ended)
     except BrokenPipeError:
         # Whoever read the output has seen enough; the interpreter must not try to flush the rest.
@@ -73,6 +84,18 @@ def exit_status(run: Callable[[], int]) -> int:
         what = "standard output" if error.filename is None else error.filename
         return _say(f"rift: {what} cannot be written ({error.strerror})", _OUTPUT)
     return status
+
+
+@contextmanager
+def _quiet_matplotlib() -> Iterator[None]:
+    """Keep what Matplotlib says of its folders, in many lines, to those who write programs."""
+    log = logging.getLogger("matplotlib")
+    level = log.level
+    log.setLevel(logging.ERROR)
+    try:
+        yield
+    finally:
+        log.setLevel(level)
 
 
 def told(run: Callable[[], int]) -> int:
@@ -162,8 +185,17 @@ class _Entry(NamedTuple):
 
     def value(self, part: Any) -> Any:
         """What was given for it, or its default."""
-        found = getattr(part, self.field)
+        found = _at_home(getattr(part, self.field))
         return not found if self.negated else found
+
+
+def _at_home(value: Any) -> Any:
+    """A value with paths that begin with a tilde as a shell makes them, which leaves --out=~/a."""
+    if isinstance(value, tuple):
+        return tuple(map(_at_home, value))
+    if isinstance(value, Path) and value.parts[:1] == ("~",):
+        return value.expanduser()
+    return value
 
 
 def _hint_of(option: ShownOption) -> str | None:
@@ -281,4 +313,4 @@ def _show_warning(message: Warning | str, *_: Any, **__: Any) -> None:
 
 
 def _terminate(number: int, frame: FrameType | None) -> None:
-    raise Terminated
+    raise Terminated(number)

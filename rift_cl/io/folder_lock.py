@@ -40,7 +40,7 @@ def keep(folder: Path) -> None:
     Raises:
         OutputError: another process keeps it, or nothing can be written there.
     """
-    path = folder.resolve() / LOCK_NAME
+    path = _lock_of(folder)
     if path in _held:
         return
     with writing(folder):
@@ -66,7 +66,12 @@ def keep(folder: Path) -> None:
 
 def let_go(folder: Path) -> None:
     """Let others have a folder; nothing where it is not kept."""
-    _release(folder.resolve() / LOCK_NAME)
+    _release(_lock_of(folder))
+
+
+def _lock_of(folder: Path) -> Path:
+    # Unlike Path.resolve, this takes links in a circle, which are told where they are followed.
+    return Path(os.path.realpath(folder), LOCK_NAME)
 
 
 def _release(path: Path) -> None:

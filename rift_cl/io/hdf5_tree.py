@@ -8,17 +8,19 @@ So the links are walked here, one by one, and nothing outside the file's own fol
 from __future__ import annotations
 
 from collections.abc import Iterator
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
 import h5py
 
-from rift_cl.errors import FileFormatError, PathEscapeError
+from rift_cl.errors import FileFormatError, PathEscapeError, RiftError
 from rift_cl.io.boundary import HOW_TO_NAME, reading
 from rift_cl.io.hdf5_heaps import check_heaps
 
 _MOST_LINKS = 200
+# Groups and datasets of a file that are looked at for what they lead to.
+_MOST_NODES = 10_000
 _DEEPEST_VIRTUAL = 16
 _LISTED = 8
 
@@ -37,6 +39,26 @@ def open_tree(path: Path) -> Iterator[Hdf5Tree]:
         yield Hdf5Tree(path, files)
 
 
+def files_behind(path: Path) -> tuple[Path, ...]:
+    """A file, and those that its links and the storage of its datasets lead to, if it is HDF5.
+
+    What leads nowhere is left out, and so is what no reader would follow, outside the folder.
+
+    Raises:
+        InputError: the file may not be opened.
+    """
+    with reading(path, "the file"):
+        if not h5py.is_hdf5(path):
+            return (path,)
+    try:
+        with open_tree(path) as tree:
+            tree.follow_all()
+            return (path, *tree.others)
+    except FileFormatError:
+        # A damaged one is told where it is read.
+        return (path,)
+
+
 class Hdf5Tree:
     """The groups and datasets that may be reached from one HDF5 file.
 
@@ -52,7 +74,35 @@ class Hdf5Tree:
         self._opened: dict[Path, Any] = {}
         self._links = 0
         self._checked: set[_Key] = set()
+        self._raw: set[Path] = set()
         self.root: Any = self._open(path.resolve())
+
+    @property
+    def others(self) -> tuple[Path, ...]:
+        """Files besides this one in which what was found so far is stored, or that led to it."""
+        found = {*self._opened, *filter(Path.is_file, self._raw)}
+        return tuple(sorted(found - {self.path.resolve()}))
+
+    def follow_all(self) -> None:
+        """Find all that may be reached, so that ``others`` names every file that matters."""
+        todo, seen = [self.root["/"]], set[_Key]()
+        while todo and len(seen) < _MOST_NODES:
+            node = todo.pop()
+            if not isinstance(node, (h5py.Dataset, h5py.Group)):
+                continue
+            key = _key(node)
+            if key in seen:
+                continue
+            seen.add(key)
+            # What cannot be followed leads to no file; the reader that needs it says so.
+            if isinstance(node, h5py.Dataset):
+                with suppress(RiftError, OSError):
+                    self._check_storage(node, ())
+                continue
+            for name in node:
+                self._links = 0
+                with suppress(RiftError, OSError, KeyError):
+                    todo.append(self._step(node, name))
 
     def find(self, name: str) -> Any:
         """The group or dataset of that name, or None.
@@ -132,10 +182,12 @@ class Hdf5Tree:
     def _check_storage(self, dataset: Any, above: tuple[_Key, ...]) -> None:
         for name, _, _ in dataset.external or ():
             # The HDF5 library looks for raw files from the working directory, not from the file.
-            self._demand_inside(Path(name).resolve(), name)
+            raw = Path(name).resolve()
+            self._demand_inside(raw, name)
+            self._raw.add(raw)
         if not dataset.is_virtual:
             return
-        key = (dataset.file.filename, h5py.h5o.get_info(dataset.id).addr)
+        key = _key(dataset)
         if key in above or len(above) > _DEEPEST_VIRTUAL:
             raise FileFormatError(f"{self.path}: {dataset.name!r} is a virtual dataset of itself")
         if key in self._checked:
@@ -181,3 +233,8 @@ class Hdf5Tree:
         if path not in self._opened:
             self._opened[path] = self._files.enter_context(h5py.File(path, "r"))
         return self._opened[path]
+
+
+def _key(node: Any) -> _Key:
+    """What tells a group or dataset from others, whatever led to it."""
+    return node.file.filename, int(h5py.h5o.get_info(node.id).addr)

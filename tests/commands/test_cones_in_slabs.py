@@ -124,7 +124,7 @@ def test_a_run_goes_on_with_a_slab_that_a_worker_made(scan, tmp_path, monkeypatc
     out = tmp_path / "out"
     given = settings(scan, out, dtype="uint16", format="h5", zingers=9.0)
     kept = begin(given)
-    receipt = make_slices(replace(given, resume=True), (), kept.mark(), 8, 24)
+    receipt = make_slices(replace(given, resume=True), kept.mark(), 8, 24)
     assert receipt.figures["dead_pixels"] == 1 and receipt.zingers > 0
     assert kept.missing() == [slice(0, 8), slice(24, ROWS)]
     with pytest.raises(OutputError, match="--resume"):
@@ -164,7 +164,7 @@ def test_slabs_are_as_large_as_the_axis_found_makes_them(tmp_path):
     given = settings(tmp_path / "scan.npz", tmp_path / "a", kind="attenuation")
     shape = reconstruction_of(given).shape
     kept = begin(given)
-    make_slices(replace(given, resume=True), (), kept.mark(), 0, 8)
+    make_slices(replace(given, resume=True), kept.mark(), 0, 8)
     ((_, slab),) = kept.slabs()
     assert slab.shape[1] > shape[1]
     volume, _ = made(reconstruction_of(replace(given, resume=True)))

@@ -131,6 +131,13 @@ def test_a_fit_goes_on_with_the_scan_that_it_began_with_alone(scans, tmp_path):
         for report in job.run():
             if report.what == "steps" and report.done >= 25:
                 job.stop()
+    moved = path.rename(tmp_path / "moved.npz")
+    job = XrayFit(settings(moved, out, checkpoint_every=20, resume=True))
+    with pytest.raises(StoppedError):
+        for report in job.run():
+            if report.what == "steps":
+                job.stop()
+    moved.rename(path)
     with np.load(path) as archive:
         arrays = dict(archive)
     arrays["projections"] = arrays["projections"] * 1.1

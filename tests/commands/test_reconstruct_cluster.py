@@ -79,7 +79,7 @@ def test_a_run_goes_on_with_a_part_that_a_worker_made(scan, tmp_path, monkeypatc
     begun._settle()
     begun.folder.make()
     begun.kept.begin(begun._facts())
-    receipt = make_slices(settings(scan, out, resume=True), (), begun.kept.mark(), 2, 7)
+    receipt = make_slices(settings(scan, out, resume=True), begun.kept.mark(), 2, 7)
     assert receipt.figures["dead_pixels"] > 0 and receipt.device
     assert begun.kept.missing() == [slice(0, 2), slice(7, ROWS)]
     volume, _ = made(Reconstruction(settings(scan, out, resume=True)))
@@ -89,7 +89,7 @@ def test_a_run_goes_on_with_a_part_that_a_worker_made(scan, tmp_path, monkeypatc
 def test_a_worker_tells_which_weights_it_chose(scan, tmp_path):
     tv = {"method": "tv", "steps": 2}
     _, token = begin_anew(settings(scan, tmp_path / "out", **tv))
-    receipt = make_slices(settings(scan, tmp_path / "out", resume=True, **tv), (), token, 2, 4)
+    receipt = make_slices(settings(scan, tmp_path / "out", resume=True, **tv), token, 2, 4)
     assert sorted(receipt.weights) == sorted(receipt.residuals) == [2, 3]
     job = Reconstruction(settings(scan, tmp_path / "b", **tv))
     job.take(receipt)
@@ -104,7 +104,7 @@ def test_a_worker_leaves_doubts_to_the_process_that_began_the_run(scan, tmp_path
         raise AssertionError("the axis is given")
 
     monkeypatch.setattr("rift_cl.commands.inputs.told_axis.find_axis", search)
-    make_slices(settings(scan, tmp_path / "out", resume=True), (), token, 2, 4)
+    make_slices(settings(scan, tmp_path / "out", resume=True), token, 2, 4)
     assert kept.missing() == [slice(0, 2), slice(4, ROWS)]
 
 
@@ -119,7 +119,7 @@ def test_a_part_is_projected_as_the_run_began(scan, tmp_path):
     asked._settle()
     assert asked.inversion.projection == {"footprint": "strip"}
     begun.kept.begin(asked._facts(), begun.inversion.projection)
-    make_slices(settings(scan, out, resume=True), (), begun.kept.mark(), 2, 7)
+    make_slices(settings(scan, out, resume=True), begun.kept.mark(), 2, 7)
     ((_, slices),) = begun.kept.slabs()
     alone, _ = made(Reconstruction(settings(scan, tmp_path / "b", error=1e-2)))
     assert slices.tobytes() == alone[2:7].tobytes()
@@ -153,10 +153,10 @@ def test_a_worker_that_stays_joins_the_later_run_too(scan, tmp_path):
     np.savetxt(angles, np.arange(40) * 4.0)
     theirs = settings(scan, out, theta=str(angles), resume=True)
     kept, token = begin_anew(settings(scan, out, theta=str(angles)))
-    make_slices(theirs, (), token, 2, 4)
+    make_slices(theirs, token, 2, 4)
     np.savetxt(angles, np.arange(40) * 4.5)
     kept, token = begin_anew(settings(scan, out, theta=str(angles), overwrite=True))
-    make_slices(theirs, (), token, 2, 4)
+    make_slices(theirs, token, 2, 4)
     ((_, slices),) = kept.slabs()
     alone, _ = made(Reconstruction(settings(scan, tmp_path / "b")))
     assert slices.tobytes() == alone[2:4].tobytes()

@@ -2,6 +2,7 @@
 
 import json
 import os
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -114,13 +115,61 @@ def test_another_frame_makes_another_scan(tmp_path, monkeypatch, capsys, name):
     folder = tiff_scan(tmp_path / "scan")
     arguments = ("reconstruct", folder, "--center", 11.5, "--out", folder / "out")
     cut_off(monkeypatch, arguments)
-    state = (folder / name).stat()
-    os.utime(folder / name, ns=(state.st_atime_ns, state.st_mtime_ns + 10**9))
+    frame = folder / name
+    state, written = frame.stat(), frame.read_bytes()
+    frame.write_bytes(written[:-1] + bytes([written[-1] ^ 1]))
+    os.utime(frame, ns=(state.st_atime_ns, state.st_mtime_ns))
     assert run(*arguments, "--resume") == INPUT
-    assert "had frames 10 files with the hash" in capsys.readouterr().err
-    os.utime(folder / name, ns=(state.st_atime_ns, state.st_mtime_ns))
+    assert f"{folder}, which was changed since" in capsys.readouterr().err
+    frame.write_bytes(written)
     (folder / "diary.txt").write_text("beside the frames")
     assert run(*arguments, "--resume") == 0
+
+
+def test_a_scan_that_was_moved_or_touched_is_the_same(tmp_path, monkeypatch, capsys):
+    """With its flats and its run, which are called by another name then."""
+    frames = 100 + made.frames(8).astype("u2")[:, :3]
+    made.write_series(tmp_path / "day/scan", "proj_{:04}.tif", frames)
+    made.write_series(tmp_path / "day/flats", "flat_{:04}.tif", 0 * frames[:2] + 500)
+    words = ("--center", 11.5, "--out")
+
+    def arguments(day):
+        return "reconstruct", day / "scan", "--flats", day / "flats", *words, day / "out"
+
+    cut_off(monkeypatch, arguments(tmp_path / "day"))
+    (tmp_path / "day").rename(tmp_path / "night")
+    os.utime(tmp_path / "night/scan/proj_0003.tif", ns=(10**18, 10**18))
+    monkeypatch.chdir(tmp_path)
+    assert run(*arguments(Path("night")), "--resume") == 0
+    assert "Gone on after 1 of 3 slices" in assumed(tmp_path / "night/out")
+    assert run(*arguments(tmp_path / "night"), "--resume") == 0
+    assert "complete already" in capsys.readouterr().err
+
+
+def test_a_scan_that_changes_while_it_is_read_gives_no_volume(tmp_path, monkeypatch, capsys):
+    folder, out, save = tiff_scan(tmp_path / "scan"), tmp_path / "out", SlabFolder.save
+    arguments = ("reconstruct", folder, "--center", 11.5, "--out", out)
+    frame = folder / "proj_0003.tif"
+    written = frame.read_bytes()
+
+    def changed(self, start, slices):
+        save(self, start, slices)
+        (tmp_path / "other.tif").write_bytes(written[:-1] + bytes([written[-1] ^ 1]))
+        (tmp_path / "other.tif").replace(frame)
+
+    monkeypatch.setattr("rift_cl.commands.reconstruct.inversion._SLAB", 1)
+    with monkeypatch.context() as patch:
+        patch.setattr(SlabFolder, "save", changed)
+        assert run(*arguments) == INPUT
+    assert f"{folder}: was changed while it was read" in capsys.readouterr().err
+    assert not (out / "slices").exists()
+    assert run(*arguments, "--resume") == INPUT
+    # What was kept is of the scan as it was.
+    frame.write_bytes(written)
+    assert run(*arguments, "--resume") == 0
+    assert run(*arguments[:-1], tmp_path / "whole") == 0
+    whole, found = (read_volume(each / "slices") for each in (tmp_path / "whole", out))
+    assert found.tobytes() == whole.tobytes()
 
 
 def test_other_angles_make_another_scan(tmp_path, monkeypatch, capsys):

@@ -20,19 +20,20 @@ from rift_cl.commands.runner import exit_status
 def handlers():
     """The handlers are those of before, whatever was heard; a background job ignores Ctrl-C."""
     usual = signal.signal(signal.SIGINT, signal.default_int_handler)
-    before = [signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)]
+    before = [signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)]
     yield
-    after = [signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)]
+    after = [signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)]
     signal.signal(signal.SIGINT, usual)
     assert after == before
 
 
-def test_a_command_that_is_terminated_ends_with_a_sentence(capsys):
+@pytest.mark.parametrize(("number", "status"), [(signal.SIGTERM, 143), (signal.SIGHUP, 129)])
+def test_a_command_that_is_ended_ends_with_a_sentence(number, status, capsys):
     def run():
-        os.kill(os.getpid(), signal.SIGTERM)
+        os.kill(os.getpid(), number)
         raise AssertionError("went on")
 
-    assert exit_status(run) == 143
+    assert exit_status(run) == status
     assert "interrupted" in capsys.readouterr().err
 
 
@@ -54,7 +55,16 @@ def test_an_interrupted_command_has_a_status_of_its_own():
     assert exit_status(run) == 130
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_lost_terminal_ends_nothing_under_nohup():
+    usual = signal.signal(signal.SIGHUP, signal.SIG_IGN)
+    try:
+        with gentle_interrupt(lambda: pytest.fail("asked to stop")):
+            assert exit_status(lambda: os.kill(os.getpid(), signal.SIGHUP) or 0) == 0
+    finally:
+        signal.signal(signal.SIGHUP, usual)
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
 def test_a_fit_is_asked_to_stop_first_and_made_to_the_second_time(number, capsys):
     asked = []
 
@@ -65,7 +75,7 @@ def test_a_fit_is_asked_to_stop_first_and_made_to_the_second_time(number, capsys
             os.kill(os.getpid(), number)
         raise AssertionError("went on")
 
-    assert exit_status(run) in (130, 143)
+    assert exit_status(run) in (129, 130, 143)
     assert asked == [number] and "stopping after this step" in capsys.readouterr().err
 
 

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rift_cl.commands.inputs.scan_rows import scan_identity
+from rift_cl.commands.inputs.scan_identity import WatchedScan
 from rift_cl.errors import FileFormatError, InputError
 from rift_cl.io import open_scan
 
@@ -79,10 +79,10 @@ def test_files_that_are_named_may_lie_anywhere(tmp_path: Path, monkeypatch) -> N
 
 def test_a_run_is_another_one_with_other_flats(tmp_path: Path) -> None:
     path = counted(tmp_path)
-    before = scan_identity(open_scan(path))
-    assert scan_identity(open_scan(path)) == before
+    before = WatchedScan(open_scan(path)).identity()
+    assert WatchedScan(open_scan(path)).identity() == before
     saved(tmp_path, flat=np.full((3, ROWS, BINS), 3090, "u2"))
-    assert scan_identity(open_scan(path)) != before
+    assert WatchedScan(open_scan(path)).identity() != before
 
 
 def test_nothing_beside_that_is_a_link_or_does_not_fit_is_taken(tmp_path: Path) -> None:

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 import zarr
 
-from rift_cl.commands.inputs.scan_rows import scan_identity
+from rift_cl.commands.inputs.scan_identity import WatchedScan
 from rift_cl.errors import FileFormatError, InputError, PathEscapeError, ResourceLimitError
 from rift_cl.io.scans.formats import is_scan_file, open_scan
 
@@ -74,9 +74,9 @@ def test_data_exchange_and_arrays_that_are_named(tmp_path):
 
 def test_a_chunk_that_is_missing_is_no_zeros(store):
     scan = open_scan(store)
-    before = scan_identity(scan)
+    before = WatchedScan(scan).identity()
     (store / "projections/2.1.0").unlink()
-    assert scan_identity(scan) != before
+    assert WatchedScan(scan).identity() != before
     scan.read(0, 3)
     with pytest.raises(FileFormatError, match=r"chunk 2\.1\.0 is missing"):
         scan.read(3, 4)

@@ -135,7 +135,8 @@ class FitCheckpoints:
 
     def _compare(self, facts: Any) -> None:
         before, now = facts.get("settings", {}), self._facts["settings"]
-        names = (before.keys() | now.keys()) - {"steps"}
+        # What is fitted is compared by its contents; checkpoints of old say where it was, too.
+        names = (before.keys() | now.keys()) - {"steps", "capture", "geometry"}
         # A size that is left open now is that of the fit, whether it was given or decided then.
         if now.get("downscale") is None:
             names -= {"downscale"}

@@ -6,11 +6,12 @@ By contents and not by times of change: a capture that was copied, or fetched ag
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Iterator, Sequence
+import os
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from rift_cl.commands.run_folder.run_folder import files_read
+from rift_cl.commands.run_folder.run_inputs import files_of, files_read
 from rift_cl.io.boundary import reading
 from rift_cl.io.captures.view import View
 
@@ -45,30 +46,21 @@ def photograph_inputs(views: Sequence[View]) -> list[FitInput]:
     return found
 
 
-def scan_inputs(settings: Any, out: Path) -> list[FitInput]:
-    """The files that the options of a run name, and those in the folders that they name.
+def scan_inputs(settings: Any, files: Sequence[Path], out: Path) -> list[FitInput]:
+    """The files of a scan, and what else the options of a run name, files or folders.
 
     Args:
         settings: of the run.
+        files: from which rows of the scan are read.
         out: its folder, whose files are its own.
 
     Raises:
         FileFormatError: a file cannot be read.
     """
-    return [
-        FitInput(str(path), _digest_of_files(path)) for path in _files_of(settings, out.resolve())
-    ]
-
-
-def _files_of(settings: Any, own: Path) -> Iterator[Path]:
-    for named in files_read(settings):
-        if named.is_dir():
-            inner = sorted(named.rglob("*"))
-            yield from (
-                each for each in inner if each.is_file() and not each.resolve().is_relative_to(own)
-            )
-        elif named.is_file():
-            yield named
+    own = Path(os.path.realpath(out))
+    named = [path for each in files_read(settings) for path in files_of(each, own)]
+    once = {path.resolve(): path for path in (*named, *files)}
+    return [FitInput(str(path), _digest_of_files(path)) for path in once.values()]
 
 
 def _digest_of_files(*paths: Path) -> str:

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, TypeVar, cast
 
+from rift_cl.commands.options import without_place
 from rift_cl.commands.run_folder.saved_settings import (
     begun_settings,
     options_of,
@@ -23,6 +24,7 @@ F = TypeVar("F", bound="FitSettings")
 # result.
 _FREE = (
     *("out", "resume", "overwrite", "dry_run", "view", "device", "config"),
+    *("capture", "geometry"),
     *("checkpoint_every", "checkpoint_minutes", "memory", "format", "preset"),
 )
 
@@ -137,9 +139,12 @@ class FitSettings:
         return {"basis": words} if words else {}
 
     def decisive(self) -> dict[str, Any]:
-        """What decides the result, by the names of options: a resumed run must have the same."""
+        """What decides the result, by the names of options: a resumed run must have the same.
+
+        What is fitted is known by its contents (``rift_cl.commands.fit.inputs``).
+        """
         return {
-            option.name: _whole(option.value)
+            option.name: _whole(without_place(option.name, option.value))
             for option in options_of(self)
             if not option.fixed and option.name not in _FREE
         } | decisive_parts()

@@ -24,6 +24,7 @@ from rift_cl.commands.inputs.axis_alignment import Alignment
 from rift_cl.commands.inputs.detector_rows import dead_rows_words
 from rift_cl.commands.inputs.row_doubts import row_doubts
 from rift_cl.commands.inputs.scan_axis import find_axis, tilt_worth_turning
+from rift_cl.commands.inputs.scan_identity import WatchedScan
 from rift_cl.commands.inputs.scan_input import ScanInput
 from rift_cl.commands.inputs.scan_lengths import BIN, with_lengths
 from rift_cl.commands.inputs.scan_rows import (
@@ -84,6 +85,7 @@ class XrayInput:
             memory=settings.memory,
         )
         opened = self.source.open_scan(fan=True)
+        self.watched = WatchedScan(opened)
         # Of cones --pitch is refused below.
         self.scan: ScanFile = with_lengths(
             opened,

@@ -136,7 +136,10 @@ class XrayFit(FitRun[FitXraySettings]):
         self._leave(splats, volume, whole)
 
     def _inputs(self) -> list[FitInput]:
-        return scan_inputs(self.settings, self.settings.out)
+        found = scan_inputs(self.settings, self.input.scan.files, self.settings.out)
+        # After the projections were read and their files looked at again.
+        self.input.watched.check()
+        return found
 
     def _read(self) -> Projections:
         """The projections, after what is to be said of them."""

@@ -1,20 +1,13 @@
-"""Rows of a scan as line integrals, and what tells one scan from another."""
+"""Rows of a scan as line integrals."""
 
 from __future__ import annotations
-
-import hashlib
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rift_cl.commands.inputs.detector_rows import DetectorRows, live_ends, read_rows, runs
 from rift_cl.errors import InputError, NonFiniteError
-from rift_cl.io.scans.hdf5_frames import Hdf5Rows
-from rift_cl.io.scans.npy_scan import NpyRows
 from rift_cl.io.scans.scan_file import ScanFile
-from rift_cl.io.scans.tiff_frames import TiffRows
-from rift_cl.io.scans.zarr_scan import ZarrRows
 from rift_cl.reconstruct.preprocess.flatfield import (
     Attenuation,
     attenuation,
@@ -23,51 +16,6 @@ from rift_cl.reconstruct.preprocess.flatfield import (
     without_masked,
     without_stuck,
 )
-
-# Blocks of a file that tell it from another, spread over it, and bytes of each.
-_BLOCKS, _BLOCK = 64, 1 << 14
-
-
-def scan_identity(scan: ScanFile) -> dict[str, str]:
-    """What tells a scan from others, and from itself before a change; sentences by name."""
-    angles = np.ascontiguousarray(scan.angles).tobytes()
-    told = {"angles": f"{scan.angles.size} with the hash {_hash(angles)}"}
-    if isinstance(scan.rows, Hdf5Rows) and scan.rows.others:
-        told["flats and darks"] = "; ".join(map(_file_identity, scan.rows.others))
-    if not isinstance(scan.rows, (TiffRows, ZarrRows, NpyRows)):
-        return {"scan file": _file_identity(scan.path), **told}
-    # A folder's own date tells nothing: what is beside the frames changes it, their content not.
-    lines = []
-    for path in scan.rows.files:
-        state = path.stat()
-        # Chunks of a store have the same names in each of its folders.
-        name = path.relative_to(scan.path) if isinstance(scan.rows, ZarrRows) else path.name
-        lines.append(f"{name}\0{state.st_size}\0{state.st_mtime_ns}\n")
-    frames = _hash("".join(lines).encode("utf-8", "surrogateescape"))
-    return {
-        "scan file": str(scan.path),
-        "frames": f"{len(lines)} files with the hash {frames}",
-        **told,
-    }
-
-
-def _file_identity(path: Path) -> str:
-    """A file in words: programs that copy files keep their times, so blocks of it count as well."""
-    state = path.stat()
-    with path.open("rb") as file:
-        begins = np.linspace(0, max(state.st_size - _BLOCK, 0), _BLOCKS, dtype=np.int64)
-        blocks = []
-        for begin in np.unique(begins):
-            file.seek(int(begin))
-            blocks.append(file.read(_BLOCK))
-    return (
-        f"{path}, {state.st_size} bytes with the hash {_hash(b''.join(blocks))}, changed at "
-        f"{state.st_mtime_ns}"
-    )
-
-
-def _hash(content: bytes) -> str:
-    return hashlib.sha256(content).hexdigest()[:16]
 
 
 def read_attenuation(scan: ScanFile, start: int, stop: int) -> Attenuation:

@@ -14,7 +14,8 @@ from rift_cl.cl.device import Device
 from rift_cl.commands.inputs.axis_alignment import Alignment
 from rift_cl.commands.inputs.beam_level import BeamLevel, beam_level
 from rift_cl.commands.inputs.row_doubts import row_doubts
-from rift_cl.commands.inputs.scan_rows import check_center, scan_identity
+from rift_cl.commands.inputs.scan_identity import WatchedScan
+from rift_cl.commands.inputs.scan_rows import check_center
 from rift_cl.commands.inputs.told_axis import axis_of_cone, unchecked_helix
 from rift_cl.commands.reconstruct.binned_file import binned_file, row_binning
 from rift_cl.commands.reconstruct.clean_rows import CleanRows
@@ -143,6 +144,7 @@ class ConeInput:
         check_options(settings)
         check_center(settings.center, file)
         self.settings, self.file, self.device = settings, file, device
+        self.watched = WatchedScan(file)
         # The scan as it is worked on.
         self.scan = binned_file(file, settings.binning)
         self.unit = file.unit
@@ -194,14 +196,20 @@ class ConeInput:
         return slice(first, stop), slice(top, bottom), slice(left, right)
 
     def read(self, first: int = 0, stop: int | None = None) -> Attenuation:
-        """Line integrals of some rows, corrected; of all if none are named."""
-        return self.clean.read(first, self.scan.shape[1] if stop is None else stop)
+        """Line integrals of some rows, corrected; of all if none are named.
 
-    def identity(self) -> dict[str, str]:
+        Raises:
+            InputError: the scan was changed since it was opened.
+        """
+        found = self.clean.read(first, self.scan.shape[1] if stop is None else stop)
+        self.watched.check()
+        return found
+
+    def identity(self) -> dict[str, Any]:
         """The file and the geometry, which decide the volume besides the settings."""
         axis = {"axis": repr(self.center), "tilt of the axis": repr(self.tilt)}
         axis["angles"] = "reversed" if self.turned else "as given"
-        return {**scan_identity(self.file), **axis, "geometry": self.geometry.digest}
+        return {**self.watched.identity(), **axis, "geometry": self.geometry.digest}
 
     def take(self, axis: tuple[float, float, bool] | None) -> None:
         """Take the axis that was found when the run began, in place of a search.

@@ -316,23 +316,20 @@ class ConeReconstruction(TalliedRun):
         """Whether the volume is made of slabs that are kept."""
         return self.settings.cluster is not None or self._goes_on
 
-    def _facts(self) -> dict[str, str]:
+    def _facts(self) -> dict[str, Any]:
         """What decides the volume."""
         own = {"rift_cl": __version__, **self.settings.decisive(), **self.source.identity()}
         return {**own, "volume": str(self.shape)}
 
-    def join(self, names: Mapping[str, str]) -> None:
+    def join(self) -> None:
         """Get ready to do a part of a run that another process has begun, about the axis it found.
-
-        Args:
-            names: what that process calls the files of the run, by their paths here.
 
         Raises:
             CheckpointError: the run is not this one.
         """
         self.source.take(self.kept.axis())
         self._locate()
-        self.kept.go_on(self._facts(), names)
+        self.kept.go_on(self._facts())
 
     def _kept_volume(self, workers: Beside[Workers] | None) -> Generator[Report, None, Assembly]:
         """Make all slices that are missing, keep them, and put the volume together meanwhile."""
@@ -348,6 +345,7 @@ class ConeReconstruction(TalliedRun):
                 yield from self.work_on(self.kept.missing(), assembly.keep)
             else:
                 yield from spread(self, workers, assembly)
+            self.source.watched.check()
             assembly.complete()
         return assembly
 

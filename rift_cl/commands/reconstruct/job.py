@@ -165,6 +165,7 @@ class Reconstruction(TalliedRun):
                     self.kept.begin(self._facts(), self.inversion.projection)
                 with self._assembly() as assembly:
                     yield from self._work(workers, assembly)
+                    self.source.watched.check()
                     assembly.complete()
             except BaseException as error:
                 if not self._keep_what_is_done():
@@ -200,11 +201,8 @@ class Reconstruction(TalliedRun):
         for note in self.source.notes[of_file:]:
             self.announce(note)
 
-    def join(self, names: Mapping[str, str]) -> None:
+    def join(self) -> None:
         """Get ready to do a part of a run that another process has begun, about the axis it found.
-
-        Args:
-            names: what that process calls the files of the run, by their paths here.
 
         Raises:
             CheckpointError: the run is not this one.
@@ -212,7 +210,7 @@ class Reconstruction(TalliedRun):
         self._take_found()
         # That process has told its doubts.
         self._locate(doubt=False)
-        self.kept.go_on(self._facts(), names)
+        self.kept.go_on(self._facts())
 
     def _take_found(self) -> None:
         """Take what was found when the run began: the axis, unless it is said, and the projector.
@@ -247,7 +245,7 @@ class Reconstruction(TalliedRun):
         check_same(self.settings.out, "the finished run", before, now)
         return True
 
-    def _facts(self) -> dict[str, str]:
+    def _facts(self) -> dict[str, Any]:
         """What decides the slices."""
         return {
             "rift_cl": __version__,
@@ -364,6 +362,8 @@ class Reconstruction(TalliedRun):
                 report = next(steps)
             except StopIteration as end:
                 slices: Floats = end.value
+                # Before they are kept: what is kept is of the scan as it was opened.
+                self.source.watched.check()
                 return slices
             yield Report(done + report.done, self._total, self._what, report.values)
 

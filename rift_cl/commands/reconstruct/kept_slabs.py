@@ -62,7 +62,7 @@ class SlabFolder:
         """Begin anew: drop what an earlier run left.
 
         Args:
-            run: what decides the slices; text by name.
+            run: what decides the slices, by name.
             projection: the setting that decides the projector, by name.
         """
         self.drop()
@@ -111,27 +111,23 @@ class SlabFolder:
             "begin anew with --overwrite"
         )
 
-    def go_on(self, run: Mapping[str, str], names: Mapping[str, str] | None = None) -> None:
+    def go_on(self, run: Mapping[str, Any]) -> None:
         """Make sure that what is there belongs to this run.
 
         Reads nothing but the record, and changes nothing.
 
         Args:
             run: what decides the slices.
-            names: what the process that began the run calls files, by their paths.
 
         Raises:
             CheckpointError: it does not; the sentence names what differs.
         """
-        before, now = (
-            {
-                what: _renamed(str(fact), names or {})
-                for what, fact in facts.items()
-                if what not in (_TOKEN, _PROJECTION)
-            }
-            for facts in (self._recorded(), run)
-        )
-        check_same(self.path, "the run that was cut off", before, now)
+        before = {
+            what: fact
+            for what, fact in self._recorded().items()
+            if what not in (_TOKEN, _PROJECTION)
+        }
+        check_same(self.path, "the run that was cut off", before, run)
 
     def _recorded(self) -> dict[str, Any]:
         try:
@@ -248,12 +244,6 @@ def _runs_without(marked: NDArray[np.bool_]) -> list[slice]:
     """Runs of what is not marked, in order."""
     edges = np.flatnonzero(np.diff(np.pad(~marked, 1).astype(np.int8)))
     return [slice(int(a), int(b)) for a, b in edges.reshape(-1, 2)]
-
-
-def _renamed(fact: str, names: Mapping[str, str]) -> str:
-    for path, name in names.items():
-        fact = fact.replace(path, name)
-    return fact
 
 
 def check_same(path: Path, what: str, before: Mapping[str, Any], run: Mapping[str, Any]) -> None:

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
 from rift_cl.commands.inputs.scan_input import ScanInput
-from rift_cl.commands.options import SpreadRun, check_tilt
+from rift_cl.commands.options import SpreadRun, check_tilt, without_place
 from rift_cl.errors import InputError
 from rift_cl.option_marks import Auto, AutoExpert, Expert
 from rift_cl.own_parts import decisive_parts
@@ -43,7 +43,7 @@ _PRECONDITIONED_CGLS = 4
 _FEWEST_PASSES = 5
 # What may differ between a run and the one that resumes it: it changes no bit of the result.
 _FREE = (
-    *("out", "device", "memory", "format", "dtype", "window"),
+    *("scan", "out", "device", "memory", "format", "dtype", "window"),
     *("overwrite", "resume", "dry_run", "preview", "config", "cluster"),
     "part_timeout",
 )
@@ -324,9 +324,22 @@ class ReconstructSettings(
         return Ramp(found.window, self.cutoff)
 
     def decisive(self) -> dict[str, Any]:
-        """The settings on which the slices depend, as text."""
-        return {
-            name: str(value)
-            for name, value in dataclasses.asdict(self).items()
-            if name not in _FREE
-        } | decisive_parts()
+        """The settings on which the slices depend, as text: of files not where they are.
+
+        What the scan's hold is told by the scan; here that of its geometry is.
+        """
+        # Imported when used: the command's help reads no file.
+        from rift_cl.io.file_content import Content
+
+        geometry = {}
+        if self.geometry is not None and self.geometry.is_file():
+            geometry["geometry"] = Content.of((self.geometry,), self.geometry).words
+        return (
+            {
+                name: str(without_place(name, value))
+                for name, value in dataclasses.asdict(self).items()
+                if name not in _FREE
+            }
+            | geometry
+            | decisive_parts()
+        )

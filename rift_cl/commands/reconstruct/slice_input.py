@@ -25,12 +25,9 @@ from rift_cl.commands.inputs.scan_axis import (
     settled_axis,
     tilt_worth_turning,
 )
+from rift_cl.commands.inputs.scan_identity import WatchedScan
 from rift_cl.commands.inputs.scan_lengths import BIN
-from rift_cl.commands.inputs.scan_rows import (
-    check_center,
-    chosen_rows,
-    scan_identity,
-)
+from rift_cl.commands.inputs.scan_rows import check_center, chosen_rows
 from rift_cl.commands.inputs.told_axis import (
     doubted_parallel,
     found_in_words,
@@ -93,6 +90,7 @@ class SliceInput:
         self.settings, self.device = settings, device
         # The scan as the file has it, and as it is worked on.
         self.file = settings.open_scan(fan=True) if file is None else file
+        self.watched = WatchedScan(self.file)
         check_center(settings.center, self.file)
         binning = settings.binning
         self.scan = binned_file(self.file, binning)
@@ -283,14 +281,14 @@ class SliceInput:
         if self.settings.tilt is None:
             self.tilt = tilt_worth_turning(self.estimate, self.file.shape[1])
 
-    def identity(self) -> dict[str, str]:
+    def identity(self) -> dict[str, Any]:
         """The file and the axis, which decide the slices besides the settings."""
-        axis = {"axis": repr(self.center), "tilt of the axis": repr(self.tilt)}
+        axis: dict[str, Any] = {"axis": repr(self.center), "tilt of the axis": repr(self.tilt)}
         if self.centers is not None:
             axis["axes of the rows"] = str(self.centers.tolist())
         if self.fan is not None:
             axis["angles"] = "reversed" if self.turned else "as given"
-        return {**scan_identity(self.file), **axis}
+        return {**self.watched.identity(), **axis}
 
     def read(self, start: int, stop: int) -> Attenuation:
         """Projections of some rows of the file, before a formula's weights and margins."""

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from contextlib import contextmanager
 from functools import lru_cache
 from pathlib import Path
@@ -85,12 +85,12 @@ def spread(job: Run, begun: Beside[Workers], assembly: Assembly) -> Iterator[Rep
     kept, workers = job.kept, begun.get()
     workers.wait()
     job.announce(workers.sentence)
-    theirs, names = _of_workers(job.settings)
+    theirs = _of_workers(job.settings)
     run = kept.mark()
     with token(kept.path) as seen:
         workers.check([theirs.out, *_files(theirs), seen])
     runs = _runs(kept.missing(), len(workers), job.block)
-    tasks = (_task(wanted, theirs, names, run) for wanted in runs)
+    tasks = (_task(wanted, theirs, run) for wanted in runs)
     used: set[str] = set()
     done, lost = -1, 0
     with Behind() as behind:
@@ -131,28 +131,22 @@ def _runs(missing: list[slice], workers: int, block: int) -> Iterator[slice]:
         yield from cut_evenly(wanted, each)
 
 
-def _task(wanted: slice, settings: ReconstructSettings, names: Mapping[str, str], run: str) -> Task:
+def _task(wanted: slice, settings: ReconstructSettings, run: str) -> Task:
     from rift_cl.cluster.workers import Task
 
-    given = settings, tuple(names.items()), run, wanted.start, wanted.stop
+    given = settings, run, wanted.start, wanted.stop
     return Task(f"slices {wanted.start} to {wanted.stop}", given, wanted.stop - wanted.start)
 
 
-def _of_workers(settings: ReconstructSettings) -> tuple[ReconstructSettings, dict[str, str]]:
-    """The settings as workers take them, and what this process calls the files that they name."""
-    theirs = absolute_files(settings)
-    names = {
-        str(getattr(theirs, field.name)): str(getattr(settings, field.name))
-        for field in dataclasses.fields(settings)
-        if getattr(theirs, field.name) != getattr(settings, field.name)
-    }
+def _of_workers(settings: ReconstructSettings) -> ReconstructSettings:
+    """The settings as workers take them."""
     # Each worker of this machine has its share of memory, and its device, by its environment.
     own: dict[str, Any] = {}
     if ClusterAddress.of(settings.cluster or "").workers:
         own = {"device": None, "memory": None}
     begun: dict[str, Any] = {"resume": True, "overwrite": False, "cluster": None, "config": None}
     begun["part_timeout"] = None
-    return dataclasses.replace(theirs, **begun, **own), names
+    return dataclasses.replace(absolute_files(settings), **begun, **own)
 
 
 def _files(settings: ReconstructSettings) -> list[Path]:
@@ -161,18 +155,11 @@ def _files(settings: ReconstructSettings) -> list[Path]:
     return [path for path in named if path is not None]
 
 
-def make_slices(
-    settings: ReconstructSettings,
-    names: tuple[tuple[str, str], ...],
-    run: str,
-    first: int,
-    stop: int,
-) -> Receipt:
+def make_slices(settings: ReconstructSettings, run: str, first: int, stop: int) -> Receipt:
     """Make and keep some slices of a run that has begun; called on a worker.
 
     Args:
         settings: the run's.
-        names: files by their paths, and what the process that began the run calls them.
         run: the token of the run, without which nothing is kept.
         first: the first slice, counted from the first row that was asked for.
         stop: the one after the last.
@@ -180,7 +167,7 @@ def make_slices(
     Raises:
         RiftError: the worker cannot do it.
     """
-    job = _joined(settings, names, run)
+    job = _joined(settings, run)
     job.metrics, job.source.clean.zingers = {}, 0
     job.inversion.residuals.clear()
     job.inversion.weights.clear()
@@ -192,7 +179,7 @@ def make_slices(
 
 
 @lru_cache(maxsize=1)
-def _joined(settings: ReconstructSettings, names: tuple[tuple[str, str], ...], run: str) -> Run:
+def _joined(settings: ReconstructSettings, run: str) -> Run:
     """The run, which this worker has joined; it stays open for its next slices.
 
     A later run of the same settings has another token: files of the same names may hold else by
@@ -204,6 +191,6 @@ def _joined(settings: ReconstructSettings, names: tuple[tuple[str, str], ...], r
     job = reconstruction_of(settings, joins=True)
     for _ in meet_driver(job.device):
         pass
-    job.join(dict(names))
+    job.join()
     job.kept.token = run
     return job

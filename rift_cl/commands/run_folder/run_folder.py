@@ -7,12 +7,11 @@ with settings at their defaults folded away.
 
 from __future__ import annotations
 
-import hashlib
 import os
 import platform
 import shutil
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from datetime import datetime, timezone
 from fnmatch import fnmatch
 from importlib.metadata import version
@@ -21,7 +20,7 @@ from typing import Any
 
 from rift_cl import __version__
 from rift_cl.cl.device import Device
-from rift_cl.commands.options import MAY_BE_FILES
+from rift_cl.commands.run_folder.run_inputs import FREE, input_contents, without_inputs
 from rift_cl.commands.run_folder.saved_settings import (
     ASKED,
     DIGEST,
@@ -33,22 +32,19 @@ from rift_cl.commands.run_folder.saved_settings import (
     whole_paths,
 )
 from rift_cl.errors import CheckpointError, InputError, OutputError
+from rift_cl.io.file_content import Content
 from rift_cl.io.folder_lock import LOCK_NAME, keep, let_go
 from rift_cl.io.json_fields import read_json_object
 from rift_cl.io.output import PART, json_text, make_folder, write_json, write_text, writing
 from rift_cl.json_parsing import parse_json
-from rift_cl.own_parts import decisive_parts, loaded_parts
+from rift_cl.own_parts import loaded_parts
 from rift_cl.report.html_page import Page
 
 _CONFIG = "config.json"
 # Says of an unfinished run that nothing of an earlier one is left.
 _CLEARED = "cleared"
-# Settings that change nothing of what comes out.
-_FREE = (
-    *("cluster", "config", "device", "dry_run", "out", "overwrite", "part_timeout", "resume"),
-    "view",
-)
-
+# What it read, by the names of options.
+_INPUTS = "inputs"
 
 # Endings of files that people may have meant to name by --out.
 _OF_FILES = (
@@ -89,7 +85,7 @@ class RunFolder:
         self._job = job
         self._asked = None if settings is None else asked_settings(settings)
         # As it is when the run begins: what changes meanwhile is found by the next one.
-        self._read = None if settings is None else input_stamps(settings, path)
+        self._inputs = {} if settings is None else input_contents(settings, path)
         self._overwrite = overwrite
         self._seen = self._config_stamp()
         ending = next((each for each in _OF_FILES if path.name.lower().endswith(each)), "")
@@ -145,16 +141,14 @@ class RunFolder:
         if not (self.path / _CONFIG).is_file():
             return None
         record = _record_of(self.path)
-        before, read = record.get("asked"), record.get("read")
+        before, inputs = record.get(ASKED), record.get(_INPUTS)
         if not isinstance(before, dict):
             return "the run there does not say what it was asked for: name another --out"
-        run = {"rift_cl": record.get("rift_cl"), **_decisive(before)}
-        differs = difference(run, {"rift_cl": __version__, **(self._asked or {})})
-        if differs is not None:
-            return f"the run there {differs}"
-        was, now = read if isinstance(read, dict) else {}, self._read or {}
-        changed = sorted(name for name in {*was, *now} if was.get(name) != now.get(name))
-        return f"{changed[0]} was changed since: name another --out" if changed else None
+        read = inputs if isinstance(inputs, dict) else {}
+        was = {"rift_cl": record.get("rift_cl"), **without_inputs(before, read), **read}
+        asked = without_inputs(self._asked or {}, self._inputs)
+        differs = difference(was, {"rift_cl": __version__, **asked, **self._inputs})
+        return None if differs is None else f"the run there {differs}"
 
     @property
     def is_complete(self) -> bool:
@@ -190,7 +184,7 @@ class RunFolder:
             **decided: what the configuration is to hold already, by name.
         """
         mark = {"job": self._job, "complete": False, "rift_cl": __version__}
-        asked = {} if self._asked is None else {"asked": self._asked, "read": self._read}
+        asked = {} if self._asked is None else {ASKED: self._asked, _INPUTS: self._inputs}
         cleared = {_CLEARED: True} if self._cleared else {}
         write_json(self.path / _CONFIG, {**mark, **asked, **cleared, **decided})
 
@@ -272,7 +266,7 @@ class RunFolder:
             **decided: what else the configuration is to hold, by name.
         """
         given = {} if asked is None else {ASKED: _changed(asked)}
-        given |= {} if self._read is None else {"read": self._read}
+        given |= {} if self._asked is None else {_INPUTS: self._inputs}
         given |= {LOADED: loaded} if (loaded := loaded_parts()) else {}
         config = {
             "job": self._job,
@@ -345,10 +339,26 @@ def difference(before: Mapping[str, Any], run: Mapping[str, Any]) -> str | None:
     if made != now:
         return f"was made by version {made or 'unknown'}, this is {now}: install that one"
     for name in sorted({*before, *run}):
-        if before.get(name) != run.get(name):
-            had, has = before.get(name), run.get(name)
+        had, has = before.get(name), run.get(name)
+        content, was = Content.read(has), Content.read(had)
+        if content is not None and was is not None:
+            if not was.is_same(content):
+                return _other_content(was, content)
+        elif content is not None:
+            return (
+                f"had {name} {had or 'unsaid'}, this one reads {content.place}: repeat its "
+                "options, unless another version made it"
+            )
+        elif had != has:
             return f"had {name} {had}, this one has {has}: repeat its options"
     return None
+
+
+def _other_content(before: Content, now: Content) -> str:
+    """What two runs read that is not the same, in words."""
+    if before.place == now.place:
+        return f"read {now.place}, which was changed since: name another --out"
+    return f"read {before.place}, and {now.place} holds something else: name another --out"
 
 
 def _is_used(entry: Path) -> bool:
@@ -358,40 +368,8 @@ def _is_used(entry: Path) -> bool:
 
 def asked_settings(settings: Any) -> dict[str, Any]:
     """The settings that differ from their defaults and decide what comes out, as JSON has them."""
-    return _decisive(parse_json(json_text(_changed(settings))))
-
-
-def _decisive(asked: Mapping[str, Any]) -> dict[str, Any]:
-    return {name: value for name, value in asked.items() if name not in _FREE}
-
-
-def files_read(settings: Any) -> Iterator[Path]:
-    """What a run reads, as far as its options name it."""
-    for option in options_of(settings):
-        if option.name in _FREE:
-            continue
-        several = option.value if isinstance(option.value, tuple) else (option.value,)
-        kinds: Any = (str, os.PathLike) if option.name in MAY_BE_FILES else os.PathLike
-        yield from (Path(value) for value in several if isinstance(value, kinds))
-
-
-def input_stamps(settings: Any, out: Path) -> dict[str, str]:
-    """Sizes and times of change of what a run reads, but for its own, by whole paths."""
-    own, stamps = Path(os.path.realpath(out)), decisive_parts()
-    for named in files_read(settings):
-        # A text that names a part of the scan may be no path at all.
-        with suppress(OSError, ValueError):
-            read = Path(os.path.realpath(named))
-            if read.is_dir():
-                inner = (path for path in sorted(read.rglob("*")) if not path.is_relative_to(own))
-                found = [
-                    f"{path.relative_to(read)}: {_stamp(path)}" for path in inner if path.is_file()
-                ]
-                digest = hashlib.sha256("\n".join(found).encode(errors="surrogateescape"))
-                stamps[str(read)] = f"{len(found)} files with the hash {digest.hexdigest()}"
-            elif read.exists():
-                stamps[str(read)] = _stamp(read)
-    return stamps
+    asked = parse_json(json_text(_changed(settings)))
+    return {name: value for name, value in asked.items() if name not in FREE}
 
 
 def _stamp(path: Path) -> str:

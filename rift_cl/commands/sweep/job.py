@@ -14,11 +14,12 @@ from pathlib import Path
 from typing import Any
 
 from rift_cl.cl.device import Device
-from rift_cl.commands.run_folder.run_folder import (
-    RunFolder,
-    asked_settings,
+from rift_cl.commands.run_folder.run_folder import RunFolder, asked_settings, difference
+from rift_cl.commands.run_folder.run_inputs import (
     files_read,
-    input_stamps,
+    input_contents,
+    named_files,
+    without_inputs,
 )
 from rift_cl.commands.sweep.one_run import is_done, run, steps
 from rift_cl.commands.sweep.report import Row, sweep_page, write_table
@@ -30,7 +31,7 @@ from rift_cl.progress import Report
 
 _RUNS = "runs"
 # What a run reads, beside the settings that decide it.
-_READ = "read"
+_INPUTS = "inputs"
 
 
 class Sweep:
@@ -170,14 +171,15 @@ class Sweep:
 
     def _decisive(self) -> dict[str, Any]:
         """What decides each run of this sweep, by its name: settings, and files as they are."""
-        stamps: dict[tuple[Path, ...], dict[str, str]] = {}
+        contents: dict[tuple[Any, ...], dict[str, Any]] = {}
         found = {}
         for each in self.runs:
             # Most runs read the same files, which may be many.
-            read = tuple(files_read(each.settings))
-            if read not in stamps:
-                stamps[read] = input_stamps(each.settings, self.settings.out)
-            decisive = {**_decisive(each.settings), _READ: stamps[read]}
+            read = tuple(named_files(each.settings))
+            if read not in contents:
+                contents[read] = input_contents(each.settings, self.settings.out)
+            asked = without_inputs(_decisive(each.settings), contents[read])
+            decisive = {**asked, _INPUTS: contents[read]}
             found[each.name] = parse_json(json.dumps(decisive, default=str))
         return found
 
@@ -194,18 +196,11 @@ class Sweep:
             self._before = dict(parse_json(path.read_text(encoding="utf-8"))["runs"])
         except (OSError, ValueError, LookupError, TypeError):
             return
-        for name, decisive in self._now.items():
-            now, before = dict(decisive), dict(self._before.get(name, decisive))
-            reads, read = now.pop(_READ), before.pop(_READ, None)
-            if before == now and read not in (None, reads):
+        for name, now in self._now.items():
+            differs = difference(*map(_flat, (self._before.get(name, now), now)))
+            if differs is not None:
                 raise CheckpointError(
-                    f"{self.settings.out}: what its run {name} read was changed since: begin anew "
-                    "with --overwrite, or name another folder (--out)"
-                )
-            if before != now:
-                raise CheckpointError(
-                    f"{self.settings.out}: its run {name} had other settings: repeat the options, "
-                    "or begin anew with --overwrite"
+                    f"{self.settings.out}: its run {name} {differs}, or begin anew with --overwrite"
                 )
 
     def _finish(self, seconds: float) -> None:
@@ -233,6 +228,13 @@ def _decisive(settings: Any) -> dict[str, Any]:
     """What decides a run: what its command says, or else all that was asked for."""
     own = getattr(settings, "decisive", None)
     return asked_settings(settings) if own is None else dict(own())
+
+
+def _flat(decisive: dict[str, Any]) -> dict[str, Any]:
+    """What decides a run, its settings and what it read, by name."""
+    inputs = decisive.get(_INPUTS)
+    settings = {name: value for name, value in decisive.items() if name != _INPUTS}
+    return {**settings, **(inputs if isinstance(inputs, dict) else {})}
 
 
 def _files(runs: list[Variation]) -> list[Path]:

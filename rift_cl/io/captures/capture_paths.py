@@ -48,7 +48,9 @@ class CaptureFolder:
         """
         found = self._find(where, name, ("",))
         if found is None and self.complete:
-            raise InputError(f"{where}: leads to {_short(name)}, which is not in {self.path}")
+            there = self._named(name, "").exists()
+            why = "no file (a folder, a pipe or a device)" if there else f"not in {self.path}"
+            raise InputError(f"{where}: leads to {_short(name)}, which is {why}")
         return found or self._named(name, "")
 
     def image(self, where: str, name: str) -> Path:

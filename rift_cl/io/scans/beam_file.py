@@ -74,6 +74,11 @@ def given_beam(
         return None
     places = [Path(request.geometry).absolute(), scan.parent / request.geometry]
     path = next((place for place in places if place.is_file()), None)
+    if path is None and any(place.exists() for place in places):
+        raise InputError(
+            f"{scan}: the geometry {request.geometry!r} is no file that can be read twice, but a "
+            "folder, a pipe or a device: copy it into a file (--geometry)"
+        )
     if path is None:
         raise InputError(f"{scan}: the geometry {request.geometry!r} is not there (--geometry)")
     return read_beam(path, pitch, unit)

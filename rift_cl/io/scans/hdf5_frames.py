@@ -12,7 +12,7 @@ import numpy as np
 from rift_cl.errors import FileFormatError
 from rift_cl.io.boundary import check_claim
 from rift_cl.io.scans.frame_stack import FrameStack, StackedRows
-from rift_cl.io.scans.hdf5_places import Hdf5Files, open_files, other_files
+from rift_cl.io.scans.hdf5_places import Hdf5Files, open_files
 from rift_cl.io.scans.scan_file import Frames, Part, ScanRows
 
 
@@ -20,9 +20,13 @@ class Hdf5Rows(StackedRows):
     """Reads rows of a scan in an HDF5 file (a ``RowSource``)."""
 
     @property
-    def others(self) -> tuple[Path, ...]:
-        """Files besides the scan's own that hold flats or darks."""
-        return other_files(*(stack.name for stack in (self.flats, self.darks) if stack))
+    def files(self) -> tuple[Path, ...]:
+        """The scan's file, and every other in which the frames are stored or that leads to them."""
+        with open_files(self.path) as files:
+            for stack in (self.projections, self.flats, self.darks):
+                if stack is not None:
+                    _unchanged(files, stack)
+            return (self.path, *files.others)
 
     def read(self, start: int, stop: int) -> ScanRows:
         """Read detector rows ``start`` to ``stop`` of every stack."""

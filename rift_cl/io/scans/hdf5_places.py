@@ -53,6 +53,14 @@ class Hdf5Files:
             self._others[path] = self._files.enter_context(open_tree(path))
         return self._others[path]
 
+    @property
+    def others(self) -> tuple[Path, ...]:
+        """Files besides the scan's in which arrays that were asked for lie, or that led to them."""
+        found = set(self.tree.others)
+        for path, tree in self._others.items():
+            found |= {path, *tree.others}
+        return tuple(sorted(found))
+
     def settled(self, part: Part, name: str | None, frame: tuple[int, ...]) -> str | None:
         """The name of an array as ``at`` takes it, where a person names a file alone.
 
@@ -76,12 +84,6 @@ class Hdf5Files:
                 f"(--{part})"
             )
         return f"{path}:{place[2] or _meant(self.other(path), part, frame)}"
-
-
-def other_files(*names: str) -> tuple[Path, ...]:
-    """The files in which arrays lie that a person named there."""
-    places = (_PLACE.fullmatch(name) for name in names)
-    return tuple(sorted({Path(place[1]) for place in places if place is not None and place[2]}))
 
 
 @contextmanager

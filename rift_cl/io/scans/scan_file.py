@@ -171,6 +171,11 @@ class ScanFile:
         )
 
     @property
+    def files(self) -> tuple[Path, ...]:
+        """Every file from which rows are read, the one or the folder itself if no more is known."""
+        return tuple(getattr(self.rows, "files", (self.path,)))
+
+    @property
     def aspect(self) -> float:
         """Distance between rows over that between bins; 1 where the file does not tell."""
         if self.cone is not None:
