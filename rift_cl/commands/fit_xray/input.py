@@ -219,7 +219,8 @@ class XrayInput:
             integrals = self._aligned(alignment)
             scale = self._strongest(integrals)
         self.notes += self._offset_note() + self._lacks(integrals, row.projections[:, 0])
-        self.notes += row_doubts(self.scan, middle, row)
+        remedy = "--loss l1 gives them less weight"
+        self.notes += row_doubts(self.scan, middle, row, remedy=remedy)
         return Projections(self._geometry(), integrals / np.float32(scale), scale, self.grid)
 
     def _strongest(self, integrals: Floats) -> float:

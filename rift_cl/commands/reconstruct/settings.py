@@ -167,7 +167,8 @@ class CorrectionOptions:
     transmission over 150 degrees or more, otherwise off."""
     zingers: Auto[float] = None
     """Replace zingers (single pixels hit by cosmic rays or scattered photons) that exceed their
-    neighbours by this many standard deviations of the noise, such as 6. Default: off."""
+    neighbours by this many standard deviations of the noise, such as 6; of scans of line
+    integrals also those that fall short of them. Default: off."""
     hardening: Auto[tuple[float, ...]] = None
     """Beam hardening of one material: coefficients a1 a2 ... of the polynomial a1 y + a2 y^2 + ...
     that makes line integrals y proportional to thickness. Default: off."""
