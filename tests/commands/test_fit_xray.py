@@ -186,6 +186,23 @@ def test_there_are_no_options_about_photographs(scans, tmp_path, capsys, option)
     assert caught.value.code == 2 and option in capsys.readouterr().err
 
 
+def test_what_no_view_shows_is_told_before_the_fit(scans, tmp_path):
+    """A third of the directions, and what is beyond the detector; of the whole scan neither."""
+    path, _ = scans[4]
+    scan = open_scan(path)
+    values, views = scan.read(0, 4).projections, slice(0, 24)
+    np.savez(tmp_path / "cut.npz", projections=values[views, :, 12:36], angles=scan.angles[views])
+    told = []
+    for source, center in ((path, 23.5), (tmp_path / "cut.npz", 11.5)):
+        given = settings(source, tmp_path / "fit", center=center, kind="attenuation")
+        job = XrayFit(given)
+        job.input.read()
+        told.append(job.input.notes)
+    whole, cut = (" ".join(notes) for notes in told)
+    for words in ("65 of 180 degrees have no view (115 to 180", "beyond a side of the detector"):
+        assert words in cut and words not in whole
+
+
 def test_options_of_scans_are_not_those_of_photographs(capture, tmp_path, capsys):
     with pytest.raises(SystemExit) as caught:
         main(["fit", str(capture), "--out", str(tmp_path / "fit"), "--center", "3"])

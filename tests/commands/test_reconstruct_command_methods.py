@@ -133,6 +133,25 @@ def test_a_full_turn_with_an_offset_axis_needs_no_word(tmp_path, center, options
     assert volume[0][seen].mean() == pytest.approx(truth[seen].mean(), rel=0.02)
 
 
+@pytest.mark.parametrize(
+    ("degrees", "compensate"),
+    [
+        (np.r_[0:90:3, 90:120], "covered"),
+        (np.arange(120), "uniform"),
+        (np.r_[0:30, 30:180:3], "voronoi"),
+    ],
+)
+def test_weights_of_views_that_nobody_chose_can_be_chosen_again(tmp_path, degrees, compensate):
+    path = tmp_path / "scan.npz"
+    save_phantom(path, np.deg2rad(degrees), 40, size=36)
+    first, said = reconstruct(path, tmp_path / "first", "--center", 19.5)
+    assert ("have no view (119 to 180" in said) == (compensate != "voronoi")
+    config = tmp_path / "first" / "config.json"
+    assert json.loads(config.read_text())["settings"]["compensate"] == compensate
+    again, _ = reconstruct(path, tmp_path / "again", "--config", config)
+    np.testing.assert_array_equal(again, first)
+
+
 @pytest.mark.parametrize("angles", [np.delete(FULL, 70), np.linspace(0, 2 * np.pi, 37)])
 def test_views_of_an_offset_axis_stand_for_their_own_side(tmp_path, angles):
     """Where one is missing or both ends of the turn are there, as ``fbp`` has it."""

@@ -281,6 +281,18 @@ def test_named_arrays(tmp_path: Path) -> None:
     np.testing.assert_array_equal(rows.flats, stack[:1, 2:3] + 99)
 
 
+@pytest.mark.parametrize("beside", [{}, {"mask": np.ones((4, 5))}, {"flats": VIEWS[:2]}])
+def test_the_only_stack_beside_angles_is_the_scan(tmp_path: Path, beside: dict[str, Any]) -> None:
+    path = tmp_path / "a.npz"
+    np.savez(path, attenuation=VIEWS, angles=np.arange(6) / 2, **beside)
+    scan = open_scan(path, kind="attenuation")
+    np.testing.assert_array_equal(whole(scan), VIEWS)
+    assert "its shape says that 'attenuation' are the projections" in " ".join(scan.notes)
+    np.savez(path, attenuation=VIEWS, other=VIEWS, angles=np.arange(6) / 2)
+    with pytest.raises(FileFormatError, match="attenuation"):
+        open_scan(path, kind="attenuation")
+
+
 def test_npz(tmp_path: Path) -> None:
     data = made.npz(tmp_path / "a.npz")
     scan = open_scan(tmp_path / "a.npz")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
+from typing import Any
 
 import h5py
 import numpy as np
@@ -293,6 +294,26 @@ def test_astra_vectors(tmp_path: Path, suffix: str) -> None:
     np.savetxt(tmp_path / "few.txt", vectors_of(cone)[:5])
     with pytest.raises(ShapeError, match=r"5 .*12|12 .* 5"):
         open_scan(tmp_path / "images", geometry=tmp_path / "few.txt", **options)
+
+
+@pytest.mark.parametrize(
+    ("lengths", "unit"),
+    [
+        ({"unit": "mm", "pitch": 0.2}, "mm"),
+        ({"unit": "mm"}, "mm"),
+        ({"unit": "um", "pitch": 200.0}, ""),
+        ({}, ""),
+    ],
+)
+def test_vectors_are_in_the_unit_of_the_scan(
+    tmp_path: Path, lengths: dict[str, Any], unit: str
+) -> None:
+    """A pitch that is another is in another unit."""
+    cone = Cone(np.deg2rad(30.0 * np.arange(12)), 6, 10, 0.2, 50, 200)
+    np.savetxt(tmp_path / "vectors.txt", vectors_of(cone))
+    np.savez(tmp_path / "scan.npz", projections=np.ones((12, 6, 10)), **lengths)
+    given = {"geometry": tmp_path / "vectors.txt", "kind": "attenuation"}
+    assert open_scan(tmp_path / "scan.npz", **given).unit == unit
 
 
 def test_rtk(tmp_path: Path) -> None:

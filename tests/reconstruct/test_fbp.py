@@ -42,6 +42,7 @@ ANGLES = {
     "unsorted": RANDOM.permutation(HALF),
     "jittered": HALF + RANDOM.uniform(-0.45, 0.45, 96) * np.pi / 96,
     "at random": np.pi * RANDOM.uniform(0, 1, 400) ** 1.2,
+    "coarse, but for a sixth": np.deg2rad(np.r_[0:30:0.5, 30:180:6]),
     "denser on one side": np.concatenate([HALF, np.linspace(0, 0.3, 300)]),
 }
 

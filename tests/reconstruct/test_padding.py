@@ -58,6 +58,19 @@ def test_truncation_is_told(truncated):
     assert not is_truncated(np.zeros((4, 8), np.float32))
 
 
+@pytest.mark.parametrize("air", [1, 3])
+def test_rows_of_air_have_no_say_in_truncation(truncated, air):
+    inside = rift.phantom.shepp_logan_sinogram(rift.Grid((64, 64)), SCAN).astype(np.float32)
+    for sinogram, cut in ((truncated, True), (inside, False)):
+        stack = np.pad(sinogram[:, None], [(0, 0), (air, air), (0, 0)])
+        stack += np.random.default_rng(1).normal(0, 0.01, stack.shape).astype(np.float32)
+        assert is_truncated(stack) == cut
+    # A projection of an object on its axis is the same in every view.
+    disc = np.sqrt(np.maximum(60**2 - (np.arange(BINS) - 39.5) ** 2, 0)).astype(np.float32)
+    stack = np.pad(np.tile(disc, (9, 1, 1)), [(0, 0), (air, air), (0, 0)])
+    assert is_truncated(stack)
+
+
 def test_nothing_added_is_nothing_changed(truncated):
     same, scan = extended(truncated, SCAN, bins=0)
     np.testing.assert_array_equal(same, truncated)

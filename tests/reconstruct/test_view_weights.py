@@ -12,6 +12,7 @@ from rift_cl.operators.filters.compensation import COMPENSATIONS
 from rift_cl.reconstruct.direct.view_weights import view_gains, view_weights
 
 WAYS = (None, "voronoi")
+COARSE = np.deg2rad(np.r_[np.arange(0, 30, 0.5), np.arange(30, 180, 6)])
 EVEN = np.linspace(0, np.pi, 12, endpoint=False)
 ANGLES = st.lists(st.floats(-20, 20), min_size=1, max_size=30).map(np.array)
 
@@ -79,6 +80,31 @@ def test_a_missing_wedge_is_nobody_s(end):
     wedge = np.linspace(0, end, 90)
     np.testing.assert_allclose(view_weights(wedge), np.pi / 90)
     assert view_weights(wedge, "voronoi")[0] > 0.3
+
+
+@pytest.mark.parametrize(
+    "angles",
+    [
+        COARSE,
+        np.r_[np.linspace(0, 0.5, 45, endpoint=False), np.linspace(0.5, np.pi, 8, endpoint=False)],
+        np.deg2rad(np.arange(0, 180, 20)[:, None] + [0, 0.7, 1.4]).ravel(),
+        np.sort(np.random.default_rng(3).random(60) * np.pi),
+        np.delete(np.arange(60) * np.pi / 60, 20),
+        np.deg2rad(np.r_[np.arange(120), 150]),
+    ],
+)
+def test_no_gap_is_a_hole_that_has_its_like_nearby(angles):
+    np.testing.assert_array_equal(view_weights(angles), view_weights(angles, "voronoi"))
+
+
+def test_uneven_views_beside_a_hole_stand_for_the_gaps_to_their_neighbours():
+    """Two wedges are missing, of 60 and of 40 degrees; angles are as float32 has them."""
+    fine, coarse = np.arange(0, 30, 0.5), np.arange(89.5, 140, 2.5)
+    angles = np.deg2rad(np.r_[fine, coarse].astype(np.float32))
+    weights = view_weights(angles)
+    shares = np.r_[np.full(len(fine), 0.5), np.full(len(coarse), 2.5)]
+    np.testing.assert_allclose(weights, np.pi * shares / shares.sum(), rtol=1e-4)
+    np.testing.assert_array_equal(weights, view_weights(angles, "covered"))
 
 
 @pytest.mark.parametrize("angles", [EVEN, EVEN**2, np.linspace(0, 1, 5), np.zeros(3)])

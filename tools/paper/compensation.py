@@ -78,8 +78,8 @@ def show(page: Page, result: dict[str, Any]) -> None:
         f"{OBJECTS} objects on {SIZE} x {SIZE} samples, {SIZE} bins. PSNR in dB inside the disc, "
         "mean over trials, each with angles, objects and noise of its own; after it, the gain over "
         "the plain ramp, with the standard deviation of that gain from trial to trial. 'ramp' "
-        "weighs every view the same; 'default' is what fbp does when told nothing: gaps where "
-        "no gap is a hole, else the same for every view."
+        "weighs every view the same; 'default' is what fbp does when told nothing: half the gaps "
+        "to the neighbours, but for holes, which are nobody's."
     )
     for index, sigma in enumerate(NOISE):
         rows = [_row(entry, index) for entry in result["scores"]]

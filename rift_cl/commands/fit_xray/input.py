@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 from rift_cl.cl.device import Device
 from rift_cl.commands.fit_xray.settings import FitXraySettings
 from rift_cl.commands.inputs.axis_alignment import Alignment
+from rift_cl.commands.inputs.beam_level import beam_level
 from rift_cl.commands.inputs.detector_rows import dead_rows_words
 from rift_cl.commands.inputs.row_doubts import row_doubts
 from rift_cl.commands.inputs.scan_axis import find_axis, tilt_worth_turning
@@ -39,6 +40,7 @@ from rift_cl.commands.inputs.told_axis import (
     offset_in_words,
     unchecked_helix,
 )
+from rift_cl.commands.inputs.told_lacks import missing_directions, missing_rays
 from rift_cl.errors import InputError
 from rift_cl.geometry import Camera, Cone, Grid, Parallel, Vectors
 from rift_cl.geometry.scan_cameras import ScanCameras, scan_cameras
@@ -218,7 +220,9 @@ class XrayInput:
             self.notes.append(alignment.words)
             integrals = self._aligned(alignment)
             scale = self._strongest(integrals)
-        self.notes += self._offset_note() + row_doubts(self.scan, middle, row)
+        self.notes += self._offset_note() + self._lacks(integrals, row.projections[:, 0])
+        remedy = "--loss l1 gives them less weight"
+        self.notes += row_doubts(self.scan, middle, row, remedy=remedy)
         return Projections(self._geometry(), integrals / np.float32(scale), scale, self.grid)
 
     def _strongest(self, integrals: Floats) -> float:
@@ -287,6 +291,20 @@ class XrayInput:
         if not isinstance(scan, Parallel) or not is_offset(scan):
             return []
         return [offset_in_words(scan.center, scan.angles, combined=False)]
+
+    def _lacks(self, integrals: Floats, line: Floats) -> list[str]:
+        """What of the object no view shows.
+
+        Args:
+            integrals: line integrals of all rows, (angle, row, bin).
+            line: those of the middle one as it was read.
+        """
+        scan = self._geometry()
+        told = missing_directions(scan.angles) if isinstance(scan, Parallel) else []
+        # Vectors have no sides of an axis, and air that is off zero is no object that goes on.
+        if isinstance(scan, Vectors) or beam_level(line) is not None:
+            return told
+        return told + missing_rays(integrals, scan)
 
     def _geometry(self) -> Parallel | Cone | Vectors:
         """The rays by what is known of the axis, in lengths of bins as they are seen at it."""

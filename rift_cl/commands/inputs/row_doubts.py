@@ -11,6 +11,8 @@ from numpy.typing import NDArray
 
 from rift_cl.commands.inputs.beam_level import beam_level
 from rift_cl.commands.inputs.detector_rows import read_rows
+from rift_cl.commands.inputs.stray_samples import stray_samples
+from rift_cl.geometry import Cone
 from rift_cl.io.scans.scan_file import ScanFile, ScanRows
 from rift_cl.reconstruct.preprocess.flatfield import Attenuation
 
@@ -37,18 +39,25 @@ _FULL_SHARE, _LEAST_CODE = 0.02, 2**8 - 1
 _BLUR, _CHANGE = 5, 0.05
 
 
-def row_doubts(scan: ScanFile, row: int, found: Attenuation) -> list[str]:
+def row_doubts(
+    scan: ScanFile,
+    row: int,
+    found: Attenuation,
+    *,
+    remedy: str = "--zingers 6 takes most of them out",
+) -> list[str]:
     """Sentences about a row, none where nothing is wrong with it.
 
     Args:
         scan: the scan.
         row: which.
         found: its line integrals, as they are worked on.
+        remedy: of line integrals that no object has, in words.
     """
     lines = found.projections[:, 0]
     # Line integrals of others may be in any unit, and have no frames.
     if scan.kind == "attenuation":
-        return _weak_beam(scan, lines)
+        return _stray(scan, row, lines, remedy) + _weak_beam(scan, lines)
     rows = read_rows(scan, row, row + 1)
     if rows.lost.all():
         return []
@@ -61,6 +70,24 @@ def row_doubts(scan: ScanFile, row: int, found: Attenuation) -> list[str]:
     silent = _silent(frames)
     starved = _starved(found, row, silent)
     return _dark_views(lines, silent) + _open_views(lines) + starved + two + told
+
+
+def _stray(scan: ScanFile, row: int, lines: Floats, remedy: str) -> list[str]:
+    """Samples far from all around them, which the other views know nothing of."""
+    # Along a helix, and where vectors place them, no two views see the same plane.
+    if scan.cone is not None and not (isinstance(scan.cone, Cone) and scan.cone.circular):
+        return []
+    stray = stray_samples(lines, scan.angles)
+    count = np.count_nonzero(stray)
+    if not count:
+        return []
+    sizes = lines[stray]
+    most = float(sizes[np.argmax(np.abs(sizes))])
+    return [
+        f"Doubt: {count} samples of row {row} stand alone far from their neighbours, such as "
+        f"{most:.4g}, and the other views show nothing of what they would measure: zingers, or "
+        f"samples that were lost; {remedy}."
+    ]
 
 
 def _silent(rows: ScanRows) -> NDArray[np.bool_]:

@@ -98,7 +98,8 @@ def _read_rows(
         return read_attenuation(scan, start, stop).projections
     first, last = max(0, start - ZINGER_HALO), min(scan.shape[1], stop + ZINGER_HALO)
     rows = read_attenuation(scan, first, last).projections
-    clean, _ = remove_zingers(rows, sigma=zingers, kind="attenuation", device=device)
+    dark = scan.kind == "attenuation"
+    clean, _ = remove_zingers(rows, sigma=zingers, dark=dark, kind="attenuation", device=device)
     return clean[:, start - first : stop - first]
 
 

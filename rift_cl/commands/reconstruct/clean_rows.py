@@ -134,7 +134,14 @@ class CleanRows:
 
     def _without_zingers(self, rows: Floats, counted: slice) -> Floats:
         sigma = self._settings.zingers or 0.0
-        clean, _ = remove_zingers(rows, sigma=sigma, kind="attenuation", device=self._device)
+        # Line integrals that others computed stray to either side: from lost counts, too.
+        clean, _ = remove_zingers(
+            rows,
+            sigma=sigma,
+            dark=self._scan.kind == "attenuation",
+            kind="attenuation",
+            device=self._device,
+        )
         self.zingers += int(np.count_nonzero(clean[:, counted] != rows[:, counted]))
         return clean
 

@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 from rift_cl import __version__
 from rift_cl.cl.budget import format_bytes
 from rift_cl.cl.device import Device
+from rift_cl.commands.inputs.told_lacks import missing_rays
 from rift_cl.commands.pictures.coverage_pictures import add_missed_planes
 from rift_cl.commands.pictures.slice_pictures import display_window
 from rift_cl.commands.reconstruct.assembly import Assembly, TakeSlab
@@ -66,7 +67,6 @@ from rift_cl.reconstruct.direct.filtered_backprojection import (
 )
 from rift_cl.reconstruct.direct.katsevich import cone_inversion
 from rift_cl.reconstruct.direct.offset_axis import is_full_turn, sees_further
-from rift_cl.reconstruct.direct.padding import is_truncated
 from rift_cl.reconstruct.direct.redundancy import ITERATE
 from rift_cl.reconstruct.solvers.tv_problem import VariationSolver
 from rift_cl.report.html_page import Page
@@ -407,23 +407,14 @@ class ConeReconstruction(TalliedRun):
         # Air that is off zero is no object that goes on.
         if self.source.air is not None:
             return
-        bin, turn = scan.center[1], is_full_turn(scan.angles)
-        further = sees_further(bin, scan.bins)
-        if not is_truncated(projections, bin if further and turn else None):
-            return
-        if further and not turn:
+        told = missing_rays(projections, scan, "cgls, sirt and tv explain the rays")
+        if told and sees_further(scan.center[1], scan.bins) and not is_full_turn(scan.angles):
             raise InputError(
                 f"{self.source.file.path}: the object reaches beyond a side of the detector, whose "
-                f"axis is at bin {bin:.1f} of {scan.bins}, and the views do not go all round, so "
-                f"that no view shows what is missing there; {ITERATE} (--method)"
+                f"axis is at bin {scan.center[1]:.1f} of {scan.bins}, and the views do not go all "
+                f"round, so that no view shows what is missing there; {ITERATE} (--method)"
             )
-        side = "the farther side" if further else "a side"
-        note = (
-            f"The object reaches beyond {side} of the detector in most views: values near the "
-            "border of the field of view are too large (cgls, sirt and tv explain the rays)."
-        )
-        self.source.notes.append(note)
-        self.announce(note)
+        self._say(*told)
 
     def _solve(self, projections: Floats, total: int) -> Generator[Report, None, Iterable[Floats]]:
         """The volume in slabs, or in one, after a report for every step."""

@@ -14,7 +14,7 @@ import numpy as np
 
 from rift_cl.commands.reconstruct.settings import ReconstructSettings
 from rift_cl.operators import FILTERS, ParallelProjector, Ramp
-from rift_cl.reconstruct.direct.view_weights import view_weights
+from rift_cl.reconstruct.direct.view_weights import WAYS, view_weights
 
 if TYPE_CHECKING:
     from rift_cl.commands.reconstruct.inversion import Inversion
@@ -75,9 +75,10 @@ def filter_settings(settings: ReconstructSettings) -> dict[str, Any]:
 
 
 def _weights(angles: np.ndarray[Any, np.dtype[np.float64]]) -> str:
-    """Which of the two that are taken without a word were the views' weights."""
-    uniform = np.array_equal(view_weights(angles), view_weights(angles, "uniform"))
-    return "uniform" if uniform else "voronoi"
+    """The compensation that the views' weights come to where none is said."""
+    weights = view_weights(angles)
+    same = (how for how in WAYS if np.array_equal(weights, view_weights(angles, how)))
+    return next(same)
 
 
 def in_words(decided: ReconstructSettings) -> str:

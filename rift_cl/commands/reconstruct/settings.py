@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 SOLVERS = ("sirt", "cgls", "tv")
 ITERATIVE = (*SOLVERS, "levels")
 Switch = Literal["auto", "on", "off"]
-Compensation = Literal["uniform", "voronoi", "capped-voronoi", "pipe-menon", "exact"]
+Compensation = Literal["uniform", "voronoi", "covered", "capped-voronoi", "pipe-menon", "exact"]
 # Options that apply to some methods only; with another one they are refused.
 _ONLY = {
     "filter": ("fbp",),
@@ -67,8 +67,8 @@ class MethodOptions:
     exponent: AutoExpert[float] = None
     """fbp: exponent p of the high-pass filter |f|^p. Default: 1, the ramp."""
     compensate: AutoExpert[Compensation] = None
-    """fbp: density compensation for irregular angles. Default: voronoi if the angles cover 180
-    degrees without a gap, otherwise uniform."""
+    """fbp: density compensation for irregular angles. Default: covered, half the gaps to a view's
+    neighbours as voronoi, but for holes such as the missing wedge; of cones and fans voronoi."""
     footprint: AutoExpert[Literal["strip", "joseph", "linear"]] = None
     """Project in real space: a pixel is spread over the bins by shared area (strip), or by linear
     interpolation between pixels (joseph) or between bins (linear). Default: see --error."""
@@ -167,7 +167,8 @@ class CorrectionOptions:
     transmission over 150 degrees or more, otherwise off."""
     zingers: Auto[float] = None
     """Replace zingers (single pixels hit by cosmic rays or scattered photons) that exceed their
-    neighbours by this many standard deviations of the noise, such as 6. Default: off."""
+    neighbours by this many standard deviations of the noise, such as 6; of scans of line
+    integrals also those that fall short of them. Default: off."""
     hardening: Auto[tuple[float, ...]] = None
     """Beam hardening of one material: coefficients a1 a2 ... of the polynomial a1 y + a2 y^2 + ...
     that makes line integrals y proportional to thickness. Default: off."""

@@ -34,6 +34,7 @@ from rift_cl.commands.inputs.told_axis import (
     hole_in_words,
     offset_in_words,
 )
+from rift_cl.commands.inputs.told_lacks import missing_directions
 from rift_cl.commands.reconstruct.binned_file import binned_file, row_binning
 from rift_cl.commands.reconstruct.clean_rows import CleanRows, LoadedRows
 from rift_cl.commands.reconstruct.settings import ReconstructSettings
@@ -42,7 +43,6 @@ from rift_cl.geometry import Fan, Parallel, at_axis
 from rift_cl.geometry.length_units import length_unit
 from rift_cl.io.number_list import read_numbers
 from rift_cl.io.scans.scan_file import ScanFile
-from rift_cl.operators.filters.directions import Directions
 from rift_cl.reconstruct import Attenuation
 from rift_cl.reconstruct.axis import AxisEstimate
 from rift_cl.reconstruct.direct.fan_rebin import covered_rays, rebin_fan
@@ -68,8 +68,6 @@ _PAD_SHARE = 2
 _LITTLE = 1e-3
 # Bins that a sentence lists at most.
 _MOST_LISTED = 8
-# A gap between directions that is worth a word, in mean steps and in radians.
-_GAP_STEPS, _GAP = 2.0, np.deg2rad(5)
 
 
 class SliceInput:
@@ -469,7 +467,7 @@ def _notes_of(source: SliceInput) -> list[str]:
         notes.append(_offset_note(source))
     elif source.off_middle and passes_half(source.geometry.angles):
         notes.append(_one_sided_note(source))
-    notes += _gap_note(source.geometry.angles)
+    notes += missing_directions(source.geometry.angles)
     notes += source.clean.notes()
     if source.scan.background:
         notes.append(
@@ -615,14 +613,3 @@ def _filled_notes(read: Attenuation, row: int) -> list[str]:
 def _listed(bins: tuple[int, ...]) -> str:
     listed = ", ".join(map(str, bins[:_MOST_LISTED])) + (", ..." if bins[_MOST_LISTED:] else "")
     return f"bin {listed}" if len(bins) == 1 else f"bins {listed}"
-
-
-def _gap_note(angles: NDArray[np.float64]) -> list[str]:
-    gaps = Directions.of(angles).gaps
-    gap = float(gaps.max())
-    if gap <= max(_GAP_STEPS * np.pi / len(gaps), _GAP):
-        return []
-    return [
-        f"{np.rad2deg(gap):.0f} of 180 degrees have no view (limited angle): edges in these "
-        "directions are blurred."
-    ]

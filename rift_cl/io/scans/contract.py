@@ -8,6 +8,7 @@ values look like, and what remains doubtful is refused with the option that sett
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -36,6 +37,8 @@ from rift_cl.io.scans.scan_file import RowSource, ScanFile, ScanRequest, pitch_w
 AIR, MEAN = "air", "mean"
 # What takes their place by itself: the beam's counts that a scanner wrote down.
 _WHITE = "white"
+# Pitches of a scan and of its geometry that differ by no more than this share are in one unit.
+_ALIKE = 0.01
 # Bins at each end that are taken for air, as a share of the detector.
 _AIR_SHARE = 0.02
 # Rows over which the mean of a view is taken.
@@ -122,7 +125,7 @@ def scan_of(found: Finding, request: ScanRequest) -> ScanFile:
         geometry = found.beam.over(found.path, found.shape, found.angles)
         notes = (*found.notes, *found.beam.notes)
         row_pitch, pitch = found.beam.pitch
-        unit = found.beam.unit
+        unit = found.beam.unit or _unit_beside(found, pitch)
         found = replace(found, pitch=pitch, row_pitch=row_pitch, unit=unit, notes=notes)
     beam = geometry or found.fan
     if beam is not None:
@@ -189,6 +192,12 @@ def _rays(found: Finding, geometry: Geometry | None) -> dict[str, Any]:
         return {"fan": found.fan if geometry is None else geometry}
     assert found.beam is not None
     return {"cone": geometry, "lean": found.beam.lean_over(found.shape[1])}
+
+
+def _unit_beside(found: Finding, pitch: float) -> str:
+    """The unit that the scan has beside a geometry without one, unless its pitch is another."""
+    alike = found.pitch is None or math.isclose(found.pitch, pitch, rel_tol=_ALIKE)
+    return found.unit if alike else ""
 
 
 def _unseen(found: Finding, geometry: Geometry | None) -> ScanFile:

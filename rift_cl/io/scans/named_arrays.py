@@ -169,23 +169,28 @@ def scan_in(store: ArrayStore, layout: Layout, request: ScanRequest) -> ScanFile
 def layout_by_name(store: ArrayStore, source: str, names: Iterable[str]) -> Layout | None:
     """Projections that no layout prescribes: the only array that is called so, if there is one.
 
+    Where none is called so, it is the only one beside angles that has an axis of as many.
+
     Args:
         store: the arrays.
         source: the format, for people.
         names: arrays that may be meant; those beside angles come first.
     """
+    names = list(names)
     called = [name for name in names if says_projections(_last(name)) and _is_stack(store, name)]
     beside_angles = [
         name for name in called if any(says_angles(_last(other)) for other in store.beside(name))
     ]
-    found = beside_angles or called
+    found, by = beside_angles or called, "its name"
+    if not called:
+        found, by = [name for name in names if _fits_angles(store, name)], "its shape"
     if len(found) != 1:
         return None
     return Layout(
         source=source,
         projections=found[0],
         search=True,
-        notes=(f"Nothing but its name says that {found[0]!r} are the projections (--dataset).",),
+        notes=(f"Nothing but {by} says that {found[0]!r} are the projections (--dataset).",),
     )
 
 
@@ -194,6 +199,15 @@ def _is_stack(store: ArrayStore, name: str) -> bool:
         return len(store.shape(name)) in _AXES
     except InputError:
         return False
+
+
+def _fits_angles(store: ArrayStore, name: str) -> bool:
+    """Whether an array that is no flats and no darks has an axis of as many as angles beside it."""
+    word = _last(name)
+    if is_said("flats", word) or is_said("darks", word) or not _is_stack(store, name):
+        return False
+    angles = [other for other in store.beside(name) if says_angles(_last(other))]
+    return any(store.shape(other) in {(size,) for size in store.shape(name)} for other in angles)
 
 
 def _completed(

@@ -6,7 +6,7 @@ import math
 import zipfile
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -82,7 +82,11 @@ def open_npz_scan(path: Path, request: ScanRequest, *, budget: int | None) -> Sc
     """Find the scan in an NPZ file; see ``open_scan``."""
     with _open(path) as archive:
         store = NpzStore(archive, budget)
-        return scan_in(store, own_layout(store, "NPZ", request.dataset), request)
+        layout = own_layout(store, "NPZ", request.dataset)
+        if request.geometry is not None and layout.pitch is None:
+            # Of parallel rays it would be that of no length.
+            layout = replace(layout, unit=store.unit(_UNIT))
+        return scan_in(store, layout, request)
 
 
 @dataclass(frozen=True)

@@ -13,6 +13,10 @@ from rift_cl.geometry.numbers import real_numbers
 Floats = NDArray[np.float64]
 # Directions closer than this are the same: the rounding of angles of a thousand turns.
 _SAME = 1e-9
+# Views beside a gap as wide as this still stand for what is in it, as those of half acquisitions do
+# (rift_cl/reconstruct/direct/offset_axis.py). A hole is so many times wider than each of so many
+# gaps on either side: clusters of a few views and random angles have their like nearby.
+_HOLE, _APART, _NEAR = np.pi / 12, 3.0, 5
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,6 +67,19 @@ class Directions:
     def __len__(self) -> int:
         """How many there are."""
         return len(self.angles)
+
+    @property
+    def holes(self) -> NDArray[np.bool_]:
+        """(n,) which gaps are holes in the scan, as the missing wedge is.
+
+        A hole is wider than 15 degrees and than three times each of the five gaps on either side
+        of it. So neither the steps of the coarse part of a scan are holes, nor those of few views.
+        """
+        holes = (self.gaps > _HOLE) & (len(self) > 1)
+        for steps in range(1, min(_NEAR, len(self) - 1) + 1):
+            for beside in (np.roll(self.gaps, steps), np.roll(self.gaps, -steps)):
+                holes &= self.gaps > _APART * beside
+        return holes
 
     def share(self, values: Floats) -> Floats:
         """What is a direction's, (n, ...), in equal parts to its views, (views, ...)."""

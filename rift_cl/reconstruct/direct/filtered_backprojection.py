@@ -73,8 +73,9 @@ class FilteredBackprojection(Composite):
             ``high-pass``), a filter, or a function of frequency.
         compensate: what each view stands for. ``uniform``: every view the same. ``voronoi``: half
             the gaps to its neighbours; in a half acquisition to those on the whole circle, as the
-            opposite ones show another side. None: as ``voronoi`` in a half acquisition and where
-            no gap is a hole, else as ``uniform``. ``capped-voronoi``, ``pipe-menon`` and ``exact``
+            opposite ones show another side. ``covered``: the same, but that a hole, such as the
+            missing wedge, is nobody's (``view_weights``). None: as ``voronoi`` in a half
+            acquisition, else as ``covered``. ``capped-voronoi``, ``pipe-menon`` and ``exact``
             depend on frequency, and are the ones for random, clustered and limited angles; on even
             angles they are the plain ramp.
         diameter: of the object, for these three, in the grid's unit of length; that of the

@@ -32,11 +32,14 @@ _STRONG = 99.0
 def is_truncated(projections: Stack, center: float | None = None) -> bool:
     """Whether most views end above zero on one side, as those of too wide an object do.
 
+    Rows that show air have no say.
+
     Args:
         projections: line integrals, (angle, bin) or (angle, row, bin), air at 0.
         center: bin of an axis that is near one side, in a full turn: what views miss beyond that
             side others show, and the farther side alone counts. Both sides count if not given.
     """
+    projections = _showing(projections)
     strong = float(np.percentile(projections, _STRONG))
     ends = [float(np.median(end)) for end in _ends(projections)]
     if center is not None:
@@ -51,8 +54,8 @@ def goes_on(row: Stack, middle: Stack) -> bool:
         row: line integrals (angle, bin) of the first or the last row, air at 0.
         middle: those of a row in the middle.
     """
-    levels = [float(np.median(each.mean(axis=-1, dtype=np.float64))) for each in (row, middle)]
-    return levels[1] > 0 and levels[0] > _TRUNCATED * levels[1]
+    beside, within = (float(_level(each)) for each in (row, middle))
+    return within > 0 and beside > _TRUNCATED * within
 
 
 def extended(projections: Stack, scan: Beam, *, bins: int | None = None) -> tuple[Stack, Beam]:
@@ -89,6 +92,21 @@ def wider(scan: Beam, before: int, after: int) -> Beam:
         row, bin = scan.center
         return replace(scan, bins=bins, center=(row, bin + before))
     return replace(scan, bins=bins, center=scan.center + before)
+
+
+def _showing(projections: Stack) -> Stack:
+    """The rows that show the object in most views; all where none stands out."""
+    if projections.ndim == 2:
+        return projections
+    levels = _level(projections)
+    shown = levels > _TRUNCATED * levels.max()
+    return projections if shown.all() or not shown.any() else projections[:, shown]
+
+
+def _level(projections: Stack) -> NDArray[np.float64]:
+    """The mean line integral of a row in most views, () of one row and (row,) of more."""
+    levels: NDArray[np.float64] = np.median(projections.mean(axis=-1, dtype=np.float64), axis=0)
+    return levels
 
 
 def _ends(projections: Stack) -> tuple[Stack, Stack]:
