@@ -259,6 +259,27 @@ def test_a_cone_beam_becomes_densities(cone, tmp_path):
     assert scores["fit_error"] < 0.09
 
 
+def test_splats_move_as_far_however_far_the_source_is(tmp_path):
+    """Rates of positions go by the volume: parallel beams and far sources are the same scan."""
+    ball = rift.phantom.Ellipsoid((1.2, -1.0, 1.5), (3.0, 4.0, 4.0), 0.0, 0.2)
+    angles, errors = np.arange(32) * np.pi / 16, []
+    for number, away in enumerate((None, 40_000.0)):
+        if away is None:
+            scan, facts = rift.Parallel(angles, 24, 0.5), {}
+            grid = rift.Grid((18, 24, 24), 0.5)
+        else:
+            scan = rift.Cone(angles, 18, 24, 1.0, away, 2 * away)
+            facts = {"source_to_axis": away, "source_to_detector": 2 * away}
+            grid = seen_grid(scan)
+        values = rift.phantom.project([ball], grid, scan)
+        path = tmp_path / f"{number}.npz"
+        np.savez(path, sinogram=values, angles=angles, pitch=0.5 if away is None else 1.0, **facts)
+        list(XrayFit(settings(path, tmp_path / str(number), center=11.5, splats=300)).run())
+        metrics = json.loads((tmp_path / str(number) / "metrics.json").read_text())
+        errors.append(metrics["scores"]["held out"]["fit_error"])
+    assert errors[1] == pytest.approx(errors[0], rel=0.1)
+
+
 def test_volumes_lie_where_those_of_reconstruct_do(scans, cone, tmp_path):
     (parallel, _), (point, _) = scans[4], cone
     axis, few = (SIZE - 1) / 2, {"steps": 1, "hold_out": 0, "format": "h5"}

@@ -36,7 +36,7 @@ from rift_cl.splat.voxels import voxelise
 from rift_cl.train.loss.homogenisation import noise_of
 from rift_cl.train.parameters import Parameters
 from rift_cl.train.start.xray import density_splats
-from rift_cl.train.xray.trainer import XrayTrainer
+from rift_cl.train.xray.trainer import XrayTrainer, volume_extent
 from rift_cl.train.xray.voxels import Footprints
 
 # Standard deviations of splats at the start, as a share of the gaps between them.
@@ -184,7 +184,11 @@ class XrayFit(FitRun[FitXraySettings]):
             few = evenly(measured.values.shape[1], _FEW)
             noise = noise_of([measured.values[:, row, :, None] for row in few])
             training = dataclasses.replace(training, noise=noise)
-        return XrayTrainer(pictures, first, training, settings.rendering, flat=measured.flat)
+        return XrayTrainer(
+            *(pictures, first, training, settings.rendering),
+            flat=measured.flat,
+            extent=volume_extent(measured.reach),
+        )
 
     def _start_error(self, trainer: XrayTrainer, measured: Projections) -> float:
         """The relative error of a few training projections before the first step."""
