@@ -18,6 +18,7 @@ from rift_cl.geometry.seen_grid import seen_grid
 from rift_cl.io.scans.formats import open_scan
 from rift_cl.io.volumes import read_volume, read_volume_place
 from rift_cl.metrics import psnr
+from rift_cl.splat.voxels import voxelise
 
 SIZE, VIEWS, PITCH = 48, 36, 0.5
 
@@ -71,10 +72,15 @@ def test_a_scan_becomes_densities_slices_and_a_report(scans, tmp_path, capsys, r
     # below a stack of rows they may hold some that no row sees.
     assert 0.6 < np.abs(scene.means[:, :2]).max() / (0.5 * SIZE * PITCH) < 1.1
     mass = np.exp(scene.logit_opacities + scene.log_scales[:, :2].sum(axis=1))
-    # One row shares its splats' height, half a bin, with the detector's blur, which widens it.
     if rows == 1:
-        area = 2 * np.pi * mass.sum() / np.sqrt(1 + 0.1 / 0.25)
+        area = 2 * np.pi * mass.sum()
         assert area == pytest.approx(truth.sum() * PITCH**2, rel=0.05)
+    # Whoever sums the file's Gaussians as they are has the density that slices and scores show.
+    assert scene.eps2d == 0
+    raised = rift.Grid(slices.shape, PITCH, ((rows - 1) / 2 * PITCH, 0, 0))
+    device = rift.default_device()
+    summed = device.get(voxelise(device, scene.upload(device), raised))
+    assert np.linalg.norm(summed - slices) < 2e-3 * np.linalg.norm(slices)
     page = (out / "report.html").read_text()
     assert page.count('class="slider"') == 1 and "filtered backprojection" in page
     assert f"Attenuation per {'mm' if unit else 'unit of length'}:" in page
@@ -86,7 +92,9 @@ def test_one_row_stays_in_its_slice(scans, tmp_path):
     assert fit(scans[1][0], tmp_path / "fit") == 0
     scene = rift.SplatScene.load(tmp_path / "fit" / "scene.ply")
     assert (scene.means[:, 2] == 0).all() and (scene.quats[:, 1:3] == 0).all()
-    np.testing.assert_allclose(np.exp(scene.log_scales[:, 2]), 0.5 * PITCH, rtol=1e-5)
+    # Half a bin, and the detector's blur.
+    across = np.sqrt(0.25 + 0.1) * PITCH
+    np.testing.assert_allclose(np.exp(scene.log_scales[:, 2]), across, rtol=1e-5)
     assert (scene.quats[:, 3] != 0).any()
 
 

@@ -28,7 +28,7 @@ from rift_cl.commands.fit_xray.scores import (
 )
 from rift_cl.commands.fit_xray.settings import FitXraySettings
 from rift_cl.commands.pictures.evenly_spaced import evenly
-from rift_cl.io.scenes.splat_scene import XrayScene
+from rift_cl.io.scenes.splat_scene import SplatScene, XrayScene
 from rift_cl.io.volumes import VOLUME_NAMES, open_volume, other_volumes
 from rift_cl.progress import Report
 from rift_cl.splat.splats import Splats
@@ -38,6 +38,7 @@ from rift_cl.train.parameters import Parameters
 from rift_cl.train.start.xray import density_splats
 from rift_cl.train.xray.trainer import XrayTrainer, volume_extent
 from rift_cl.train.xray.voxels import Footprints
+from rift_cl.train.xray.widening import Densities, widened
 
 # Standard deviations of splats at the start, as a share of the gaps between them.
 _SIZE = 0.8
@@ -199,10 +200,13 @@ class XrayFit(FitRun[FitXraySettings]):
         return relative_error(np.stack(images), np.stack(truth))
 
     def _leave(self, splats: Splats, volume: Floats, whole: Projections) -> None:
-        """Write splats, slices and report, in the scan's units."""
+        """Write splats, slices and report, in the scan's units.
+
+        The splats hold what projections widen them by: their sum is what slices and scores show.
+        """
         settings, source, pitch = self.settings, self.input, self.input.pitch
         density = whole.scale / pitch
-        scene = XrayScene.of(splats, self.device)
+        scene = self._scene(splats)
         raised = np.array([0, 0, source.raised], np.float32)
         # Modes are shares of the peak, in units of the splats' axes: no unit changes them.
         dataclasses.replace(
@@ -229,6 +233,15 @@ class XrayFit(FitRun[FitXraySettings]):
         about = (self.scores, self.losses, self.metrics, notes, source.unit)
         page = xray_page(name, shown, *about)
         self.folder.finish(self.settled, self.metrics, page, self.device, asked=settings)
+
+    def _scene(self, splats: Splats) -> SplatScene:
+        """Splats as wide as projections show them, or as they were trained where none are so."""
+        scene = XrayScene.of(splats, self.device)
+        narrow = Densities(*(getattr(scene, name) for name in Densities._fields))
+        found = widened(narrow, self.input.dilation)
+        if found is None:
+            return dataclasses.replace(scene, eps2d=self.settings.rendering.eps2d)
+        return dataclasses.replace(scene, **found._asdict(), eps2d=0.0)
 
     def _voxels(self, splats: Splats, whole: Projections) -> Floats:
         """The splats on the grid; plain ones to the last bits of fits from before modes."""
