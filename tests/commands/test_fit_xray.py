@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import shutil
 
 import numpy as np
@@ -286,6 +287,31 @@ def test_splats_move_as_far_however_far_the_source_is(tmp_path):
         metrics = json.loads((tmp_path / str(number) / "metrics.json").read_text())
         errors.append(metrics["scores"]["held out"]["fit_error"])
     assert errors[1] == pytest.approx(errors[0], rel=0.1)
+
+
+@pytest.mark.parametrize("what", ["below zero", "few views", "noise", "cut off"])
+def test_densities_below_zero_are_told_and_streaks_are_not(tmp_path, what):
+    """Splats cannot be negative; filtered backprojection is, in more ways than one."""
+    grid, views = rift.Grid((8, 32, 32)), 9 if what == "few views" else 32
+    scan = rift.Parallel(np.arange(views) * np.pi / views, 32)
+    shapes = [rift.phantom.Ellipsoid((0.0, 0.0, 0.0), (9.0, 12.0, 12.0), 0.0, 0.2)]
+    if what == "below zero":
+        shapes.append(rift.phantom.Ellipsoid((0.0, 2.0, 6.0), (3.0, 3.0, 3.0), 0.0, -0.3))
+    values = rift.phantom.project(shapes, grid, scan)
+    if what == "noise":
+        values += 0.3 * np.random.default_rng(0).normal(size=values.shape)
+    if what == "cut off":
+        values = values[..., 8:-8]
+    np.savez(tmp_path / "scan.npz", projections=values, angles=scan.angles, pitch=1.0)
+    given = {"center": (values.shape[-1] - 1) / 2, "kind": "attenuation", "steps": 100}
+    job, notes = XrayFit(settings(tmp_path / "scan.npz", tmp_path / "fit", **given)), []
+    job.announce = notes.append
+    list(job.run())
+    told = [note for note in notes if "below zero" in note]
+    assert len(told) == (what == "below zero")
+    # -0.1 is blurred by a voxel.
+    lowest = [float(re.search(r"down to (\S+) per", note)[1]) for note in told]
+    assert all(-0.1 < value < -0.05 for value in lowest)
 
 
 def test_volumes_lie_where_those_of_reconstruct_do(scans, cone, tmp_path):

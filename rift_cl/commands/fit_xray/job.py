@@ -17,6 +17,7 @@ from rift_cl.commands.fit_photos.report import history_notes
 from rift_cl.commands.fit_photos.scores import score_record
 from rift_cl.commands.fit_photos.view_split import split_views
 from rift_cl.commands.fit_xray.input import Projections, XrayInput, XrayPictures
+from rift_cl.commands.fit_xray.negative_doubt import lowest_missed, negative_note
 from rift_cl.commands.fit_xray.report import xray_page
 from rift_cl.commands.fit_xray.scores import (
     backprojected,
@@ -134,7 +135,14 @@ class XrayFit(FitRun[FitXraySettings]):
             **self.settings.basis_facts(),
             **score_record(self.scores),
         }
-        self._leave(splats, volume, whole)
+        voxels = self._voxels(splats, whole)
+        missed = lowest_missed(trainer.renderer, splats, measured, voxels)
+        density = whole.scale / self.input.pitch
+        doubts = negative_note(missed, density, self.input.unit or "unit of length")
+        for doubt in doubts:
+            self.announce(doubt)
+        self.input.notes += doubts
+        self._leave(splats, volume, voxels, whole)
 
     def _inputs(self) -> list[FitInput]:
         return scan_inputs(self.settings, self.settings.out)
@@ -199,7 +207,7 @@ class XrayFit(FitRun[FitXraySettings]):
         truth = [measured.picture(number) for number in few]
         return relative_error(np.stack(images), np.stack(truth))
 
-    def _leave(self, splats: Splats, volume: Floats, whole: Projections) -> None:
+    def _leave(self, splats: Splats, volume: Floats, voxels: Floats, whole: Projections) -> None:
         """Write splats, slices and report, in the scan's units.
 
         The splats hold what projections widen them by: their sum is what slices and scores show.
@@ -215,7 +223,7 @@ class XrayFit(FitRun[FitXraySettings]):
             log_scales=scene.log_scales + np.float32(log(pitch)),
             logit_opacities=scene.logit_opacities + np.float32(log(density)),
         ).save(settings.out / "scene.ply")
-        slices = density * self._voxels(splats, whole)
+        slices = density * voxels
         path = settings.out / VOLUME_NAMES[settings.format]
         with open_volume(
             path,
