@@ -23,7 +23,7 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, nullcontext
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, Literal, TypeVar
+from typing import Any, Literal, TypeVar, get_args
 
 import numpy as np
 
@@ -48,6 +48,7 @@ from rift_cl.commands.run_folder.saved_settings import (
     saved_settings,
 )
 from rift_cl.errors import InputError, StoppedError, WrongTypeError
+from rift_cl.io.scans.literals import Kind
 from rift_cl.progress import Report
 
 PathLike = str | os.PathLike[str]
@@ -104,7 +105,7 @@ def fit(
     capture: PathLike,
     out: PathLike | None = None,
     *,
-    kind: Literal["photos", "xray"] | None = None,
+    kind: Literal["photos", "xray"] | Kind | None = None,
     progress: Progress = None,
     **settings: Any,
 ) -> FittedScene:
@@ -115,8 +116,9 @@ def fit(
             see ``open_scan``.
         out: folder for scene.ply, the cameras, report.html, config.json, metrics.json and
             checkpoints; a temporary one when not given.
-        kind: which of the two; an X-ray scan where ``capture`` is a scan file or describes one,
-            else photographs, when not given.
+        kind: which of the two, or what the values of a scan are (counts, transmission or
+            attenuation), which says as well that it is one; an X-ray scan where ``capture`` is a
+            scan file or describes one, else photographs, when not given.
         progress: is called with a report now and then; breaks off by returning False, with a
             checkpoint from which ``resume=True`` goes on.
         **settings: the command's options by their names in Python, such as ``steps=3000`` or
@@ -132,9 +134,14 @@ def fit(
     from rift_cl.commands.fit_xray.job import XrayFit
     from rift_cl.commands.fit_xray.settings import FitXraySettings
 
-    if kind not in (None, "photos", "xray"):
-        raise InputError(f"kind is {kind!r}, wanted 'photos' or 'xray'")
-    xray = is_scan(Path(capture)) if kind is None else kind == "xray"
+    if kind in get_args(Kind):
+        settings["kind"] = kind
+    elif kind not in (None, "photos", "xray"):
+        raise InputError(
+            f"kind is {kind!r}, wanted 'photos' or 'xray', or what the values of a scan are: "
+            f"{', '.join(get_args(Kind))}"
+        )
+    xray = is_scan(Path(capture)) if kind is None else kind != "photos"
     with _folder(out, FitPhotosSettings, FitXraySettings) as (folder, keep):
         given = {"capture": capture, "out": folder, **settings}
         job: Fit | XrayFit

@@ -96,6 +96,8 @@ class Trainer:
         settings: of the fit.
         rendering: how splats are rendered; the activation is that of the settings.
         flat: whether all splats lie in one slice.
+        extent: the length that positions' rates are measured in; how far the cameras spread when
+            not given.
 
     Raises:
         InputError: the strategy is not for such splats, or ``settings.solve`` not for this trainer.
@@ -111,6 +113,7 @@ class Trainer:
         rendering: SplatSettings | None = None,
         *,
         flat: bool = False,
+        extent: float | None = None,
     ) -> None:
         self.pictures = pictures
         self.parameters = parameters
@@ -122,7 +125,8 @@ class Trainer:
         settings.solve.check_heed(self.solves)
         self.device: Device = parameters.device
         check_own_loss(self.device, settings.loss)
-        extent, views = scene_extent(pictures.cameras), len(pictures.cameras)
+        views = len(pictures.cameras)
+        extent = scene_extent(pictures.cameras) if extent is None else extent
         self.schedule = LearningRateSchedule(settings, extent, views)
         self.size = scene_size(pictures.cameras)
         self._mean_pixels = sum(math.prod(camera.size) for camera in pictures.cameras) / views
@@ -335,7 +339,8 @@ class Trainer:
     def alike(self, parameters: Parameters) -> Trainer:
         """A fit of the same views by the same settings that begins with other splats."""
         rendering = self.renderer.settings
-        return type(self)(self.pictures, parameters, self.settings, rendering, flat=self.flat)
+        given = self.pictures, parameters, self.settings, rendering
+        return type(self)(*given, flat=self.flat, extent=self.schedule.extent)
 
     def camera(self, number: int) -> Camera:
         """The camera of a view, with its pose as refined so far."""

@@ -48,6 +48,19 @@ def test_a_scan_file_is_fitted_as_x_rays(tmp_path):
     assert "held out, fit_error" in made._repr_html_()
 
 
+def test_the_kind_of_a_scans_values_says_that_it_is_one(tmp_path):
+    """What the values are can be said to ``rift.fit`` as to its command and to other functions."""
+    grid, scan = rift.Grid((24, 24)), rift.Parallel(np.arange(16) * np.pi / 16, 24)
+    # No air at the ends of the detector says whether it is bright.
+    values = rift.phantom.shepp_logan_sinogram(grid, scan)[:, 6:-6]
+    path = tmp_path / "scan.npz"
+    np.savez(path, projections=values / values.max(), angles=scan.angles)
+    with pytest.raises(InputError, match="kind="):
+        rift.fit(path, steps=5, splats=50, center=5.5)
+    made = rift.fit(path, kind="attenuation", steps=5, splats=50, center=5.5)
+    assert made.scene.mode == "xray" and made.settings.kind == "attenuation"
+
+
 def test_cameras_of_another_program_are_no_scan(tmp_path):
     np.savez(tmp_path / "cameras.npz", world_mat_0=np.eye(4), scale_mat_0=np.eye(4))
     with pytest.raises(InputError, match="IDR"):

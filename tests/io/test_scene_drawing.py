@@ -137,10 +137,14 @@ def test_comments_without_a_meaning_are_refused(tmp_path, said, words) -> None:
         rift.SplatScene.load(tmp_path / "a.ply")
 
 
-def test_x_rays_know_none_of_it(tmp_path) -> None:
+def test_x_rays_know_their_blur_alone(tmp_path) -> None:
     arrays = {name: getattr(made.scene(7, 0), name) for name in made.ARRAYS}
     with pytest.raises(InputError, match="antialiased"):
         XrayScene(**arrays, antialiased=True)
+    XrayScene(**arrays, eps2d=0.0).save(tmp_path / "a.ply")
+    assert rift.SplatScene.load(tmp_path / "a.ply").eps2d == 0
+    opened = SceneInput(scene=tmp_path / "a.ply").open_scene(densities=True)
+    assert opened.rendering.eps2d == 0
     XrayScene(**arrays).save(tmp_path / "a.ply")
     content = (tmp_path / "a.ply").read_bytes()
     line = b"comment rift-cl drawing: light linear\nelement vertex"

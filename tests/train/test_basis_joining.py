@@ -18,7 +18,7 @@ from rift_cl.train.start.points import random_points, start_splats
 from rift_cl.train.strategy import DefaultSettings, McmcSettings
 from rift_cl.train.trainer import Trainer
 from rift_cl.train.xray.settings import XrayTrainSettings
-from rift_cl.train.xray.trainer import XrayTrainer
+from rift_cl.train.xray.trainer import XrayTrainer, volume_extent
 
 pytestmark = pytest.mark.once
 
@@ -141,7 +141,12 @@ def test_flat_scans_have_no_modes_across_their_slice(device):
     settings = XrayTrainSettings(steps=STEPS, splats=30, basis=basis)
     rendering = SplatSettings(mode="xray")
     trainer = XrayTrainer(
-        pictures, Parameters.of(device, raw, density=True), settings, rendering, flat=True
+        pictures,
+        Parameters.of(device, raw, density=True),
+        settings,
+        rendering,
+        flat=True,
+        extent=volume_extent(6.0),
     )
     run_to(trainer, 12)
     modes = trainer.parameters.host()[0]["shape_modes"]

@@ -16,7 +16,7 @@ from rift_cl.train.start.points import start_splats
 from rift_cl.train.strategy import XraySettings
 from rift_cl.train.xray.settings import XrayTrainSettings
 from rift_cl.train.xray.solve_settings import SolveSettings
-from rift_cl.train.xray.trainer import XrayTrainer
+from rift_cl.train.xray.trainer import XrayTrainer, volume_extent
 
 pytestmark = pytest.mark.once
 
@@ -43,6 +43,7 @@ def trainer_of(device, pictures, *, rows, every=5, first=4):
         replace(settings, strategy=strategy),
         DRAWING,
         flat=rows == 1,
+        extent=volume_extent(SIZE / 2),
     )
 
 

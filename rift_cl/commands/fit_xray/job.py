@@ -17,6 +17,7 @@ from rift_cl.commands.fit_photos.report import history_notes
 from rift_cl.commands.fit_photos.scores import score_record
 from rift_cl.commands.fit_photos.view_split import split_views
 from rift_cl.commands.fit_xray.input import Projections, XrayInput, XrayPictures
+from rift_cl.commands.fit_xray.negative_doubt import lowest_missed, negative_note
 from rift_cl.commands.fit_xray.report import xray_page
 from rift_cl.commands.fit_xray.scores import (
     backprojected,
@@ -28,7 +29,7 @@ from rift_cl.commands.fit_xray.scores import (
 )
 from rift_cl.commands.fit_xray.settings import FitXraySettings
 from rift_cl.commands.pictures.evenly_spaced import evenly
-from rift_cl.io.scenes.splat_scene import XrayScene
+from rift_cl.io.scenes.splat_scene import SplatScene, XrayScene
 from rift_cl.io.volumes import VOLUME_NAMES, open_volume, other_volumes
 from rift_cl.progress import Report
 from rift_cl.splat.splats import Splats
@@ -36,8 +37,9 @@ from rift_cl.splat.voxels import voxelise
 from rift_cl.train.loss.homogenisation import noise_of
 from rift_cl.train.parameters import Parameters
 from rift_cl.train.start.xray import density_splats
-from rift_cl.train.xray.trainer import XrayTrainer
+from rift_cl.train.xray.trainer import XrayTrainer, volume_extent
 from rift_cl.train.xray.voxels import Footprints
+from rift_cl.train.xray.widening import Densities, widened
 
 # Standard deviations of splats at the start, as a share of the gaps between them.
 _SIZE = 0.8
@@ -133,7 +135,14 @@ class XrayFit(FitRun[FitXraySettings]):
             **self.settings.basis_facts(),
             **score_record(self.scores),
         }
-        self._leave(splats, volume, whole)
+        voxels = self._voxels(splats, whole)
+        missed = lowest_missed(trainer.renderer, splats, measured, voxels)
+        density = whole.scale / self.input.pitch
+        doubts = negative_note(missed, density, self.input.unit or "unit of length")
+        for doubt in doubts:
+            self.announce(doubt)
+        self.input.notes += doubts
+        self._leave(splats, volume, voxels, whole)
 
     def _inputs(self) -> list[FitInput]:
         found = scan_inputs(self.settings, self.input.scan.files, self.settings.out)
@@ -187,7 +196,11 @@ class XrayFit(FitRun[FitXraySettings]):
             few = evenly(measured.values.shape[1], _FEW)
             noise = noise_of([measured.values[:, row, :, None] for row in few])
             training = dataclasses.replace(training, noise=noise)
-        return XrayTrainer(pictures, first, training, settings.rendering, flat=measured.flat)
+        return XrayTrainer(
+            *(pictures, first, training, settings.rendering),
+            flat=measured.flat,
+            extent=volume_extent(measured.reach),
+        )
 
     def _start_error(self, trainer: XrayTrainer, measured: Projections) -> float:
         """The relative error of a few training projections before the first step."""
@@ -197,11 +210,14 @@ class XrayFit(FitRun[FitXraySettings]):
         truth = [measured.picture(number) for number in few]
         return relative_error(np.stack(images), np.stack(truth))
 
-    def _leave(self, splats: Splats, volume: Floats, whole: Projections) -> None:
-        """Write splats, slices and report, in the scan's units."""
+    def _leave(self, splats: Splats, volume: Floats, voxels: Floats, whole: Projections) -> None:
+        """Write splats, slices and report, in the scan's units.
+
+        The splats hold what projections widen them by: their sum is what slices and scores show.
+        """
         settings, source, pitch = self.settings, self.input, self.input.pitch
         density = whole.scale / pitch
-        scene = XrayScene.of(splats, self.device)
+        scene = self._scene(splats)
         raised = np.array([0, 0, source.raised], np.float32)
         # Modes are shares of the peak, in units of the splats' axes: no unit changes them.
         dataclasses.replace(
@@ -210,7 +226,7 @@ class XrayFit(FitRun[FitXraySettings]):
             log_scales=scene.log_scales + np.float32(log(pitch)),
             logit_opacities=scene.logit_opacities + np.float32(log(density)),
         ).save(settings.out / "scene.ply")
-        slices = density * self._voxels(splats, whole)
+        slices = density * voxels
         path = settings.out / VOLUME_NAMES[settings.format]
         with open_volume(
             path,
@@ -228,6 +244,15 @@ class XrayFit(FitRun[FitXraySettings]):
         about = (self.scores, self.losses, self.metrics, notes, source.unit)
         page = xray_page(name, shown, *about)
         self.folder.finish(self.settled, self.metrics, page, self.device, asked=settings)
+
+    def _scene(self, splats: Splats) -> SplatScene:
+        """Splats as wide as projections show them, or as they were trained where none are so."""
+        scene = XrayScene.of(splats, self.device)
+        narrow = Densities(*(getattr(scene, name) for name in Densities._fields))
+        found = widened(narrow, self.input.dilation)
+        if found is None:
+            return dataclasses.replace(scene, eps2d=self.settings.rendering.eps2d)
+        return dataclasses.replace(scene, **found._asdict(), eps2d=0.0)
 
     def _voxels(self, splats: Splats, whole: Projections) -> Floats:
         """The splats on the grid; plain ones to the last bits of fits from before modes."""

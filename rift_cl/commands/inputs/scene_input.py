@@ -23,8 +23,9 @@ class SceneInput:
     scene: Annotated[Path, Positional]
     """A .ply, .spz or .splat file, or the folder of a 'rift fit'."""
     eps2d: Auto[float] = None
-    """Variance added to every splat on the screen, in square pixels. Default: that of the fit, or
-    0.3 for a file."""
+    """Variance added to every splat on the screen, in square pixels. Default: what the file
+    says, as 0 for X-rays whose splats hold it already; otherwise that of the fit, or 0.3 for a
+    file."""
     background: Auto[tuple[float, float, float]] = None
     """Background colour: red, green and blue in display light, 0 to 1. Default: that of the fit, or
     black for a file."""

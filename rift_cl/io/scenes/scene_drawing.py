@@ -4,6 +4,9 @@ Colours in linear light are no display codes, and splats that were dimmed as the
 (antialiased, Mip-Splatting) are too opaque without it. One comment in the header of a PLY file says
 so: ``rift-cl drawing: light linear, antialiased, eps2d 0.1``, with whatever differs from display
 light and splats that are not dimmed. A file without it is drawn as files always were.
+
+Of X-rays it says ``eps2d`` alone: 0 where the splats hold that variance already, and their sum is
+the density that was scored.
 """
 
 from __future__ import annotations
@@ -31,7 +34,8 @@ class SceneDrawing:
     Args:
         light: that colours are in, and splats are blended in.
         antialiased: whether splats are dimmed as ``eps2d`` widens them; see ``SplatSettings``.
-        eps2d: that they were fitted with, in square pixels; None where that is not said.
+        eps2d: that they are to be drawn with, in square pixels of what they were fitted to; None
+            where that is not said.
     """
 
     light: LightKind = "display"
@@ -53,10 +57,10 @@ class SceneDrawing:
         found = cls(
             scene.light, bool(scene.antialiased), None if eps2d is None else one_number(eps2d)
         )
-        if scene.mode == "xray" and not found.usual:
+        if scene.mode == "xray" and found.of_light:
             raise InputError(
-                f"SplatScene: splats of X-rays know no {found.words}: leave out light, antialiased "
-                "and eps2d"
+                f"SplatScene: splats of X-rays know no {found.words}: leave out light and "
+                "antialiased"
             )
         return found
 
@@ -64,6 +68,11 @@ class SceneDrawing:
     def usual(self) -> bool:
         """Whether there is nothing to say."""
         return self == SceneDrawing()
+
+    @property
+    def of_light(self) -> bool:
+        """Whether it says what has a meaning for photographs alone."""
+        return self.light != "display" or self.antialiased
 
     @property
     def words(self) -> str:

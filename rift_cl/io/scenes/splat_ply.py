@@ -60,7 +60,7 @@ def read_ply(
         mode = "xray"
     basis = read_basis(path, header.comments, header.properties)
     drawing = read_drawing(path, header.comments)
-    if mode == "xray" and not drawing.usual:
+    if mode == "xray" and drawing.of_light:
         raise FileFormatError(
             f"{path}: says {drawing.words!r} of X-rays, which know none; the file is damaged"
         )

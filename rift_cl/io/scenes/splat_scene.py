@@ -70,7 +70,8 @@ class SplatScene:
         angular: what colours vary in; see ``SplatSettings``.
         light: that colours are in: ``display`` or ``linear``.
         antialiased: whether splats are dimmed as ``eps2d`` widens them; see ``SplatSettings``.
-        eps2d: that they were fitted with, in square pixels; None where that is not known.
+        eps2d: that they are to be drawn with, in square pixels of what they were fitted to; None
+            where that is not known.
 
     Raises:
         ShapeError: an array does not fit the others.

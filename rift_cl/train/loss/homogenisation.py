@@ -9,9 +9,10 @@ of the pixelwise part is multiplied by a ramp in the Fourier domain of the image
 and scaled back to the norm it had; that of D-SSIM, a high-pass itself, stays as it is. X-ray views
 of an orbit are too dense along the detector's rows alone: there k is the frequency along x.
 
-Both are what views that lie evenly sample. Where they do not, the weight may be what was counted
-instead: one over the coverage L of the frequency by all views, to the power p, which is k^p for
-even views on a sphere (``rift_cl.train.loss.coverage_weight``).
+Both are what views that lie evenly sample. The weight may be what was counted instead: one over
+the coverage L of the frequency by all views, to the power p, which is k^p for even views on a
+sphere (``rift_cl.train.loss.coverage_weight``). As every view keeps its norm, that weighs the
+frequencies of a view against each other, and does not make up for views that lie close together.
 
 Either amplifies noise as well, and once only noise is left of the residual a flat weight is the
 best there is. So the exponent falls with the share of the residual that is noise,
@@ -62,8 +63,9 @@ class Homogenisation:
     coarse, 0 to 4 (0 = none). Default: 0 for X-rays; for photographs 0.5, or 0 for fewer than
     40."""
     weight: Annotated[WeightKind, arg(name="homogenise-by", prefix_name=False)] = "ramp"
-    """What is raised to the exponent of --homogenise: the frequency (ramp), which suits evenly
-    spaced views, or one over the coverage of the frequency by all views (coverage)."""
+    """What is raised to the exponent of --homogenise: the frequency (ramp), or one over the
+    coverage of the frequency by all views (coverage). Neither makes up for uneven spacing of
+    views, each of which counts as before."""
     noise_aware: Expert[bool] = True
     """Lower the exponent as the residual comes down to the noise of the images."""
     along_rows: Expert[bool] = False

@@ -32,7 +32,8 @@ class TrainingRun:
         steps: optimization steps of the whole run.
         splats: most splats that there may be.
         seed: random seed; draw from (seed, step), so that a resumed run repeats the same bits.
-        extent: the length that positions' learning rates are measured in: how far cameras spread.
+        extent: the length that positions' learning rates are measured in: how far cameras spread,
+            or a few reaches of the volume of an X-ray scan.
         cooldown: the step with which the cooldown begins.
         size: the length that scales are measured in: about how far cameras are from what they see.
     """

@@ -29,6 +29,8 @@ class XrayLearningRates(LearningRates):
 
     # The start is near already, so that positions need not slow down by much.
     means: float = 3e-4
+    """Learning rate of positions, as a fraction of the scene's extent, which is 2.6 times the
+    distance from the rotation axis to the outermost ray."""
     means_steps: int = 0
     means_last: float = 0.1
     quats: float = 2e-2

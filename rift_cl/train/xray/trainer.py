@@ -4,6 +4,9 @@ Line integrals need no colour: it is one, has no rate, and the loss looks at the
 scan of one detector row says nothing about what is across it. Gradients there are no more than
 rounding, which Adam would blow up to whole steps, so that after each step the splats are put back
 into their slice; modes of their shapes that vary across it stay at zero.
+
+How far the cameras spread is no measure of the object: a source may be far away, and that of
+parallel beams is nowhere. Rates of positions go by the reach of the volume instead.
 """
 
 from __future__ import annotations
@@ -18,6 +21,18 @@ from rift_cl.train.start.xray import FLAT
 from rift_cl.train.trainer import Trainer, TrainingViews
 from rift_cl.train.xray.density_solve import solve_densities
 
+# What the rates of positions were found with, in parallel beams over half a turn.
+_REACHES = 2.6
+
+
+def volume_extent(reach: float) -> float:
+    """The length that positions' rates are measured in, the same for all geometries.
+
+    Args:
+        reach: distance from the rotation axis to the outermost ray.
+    """
+    return _REACHES * reach
+
 
 class XrayTrainer(Trainer):
     """A fit of densities in progress.
@@ -28,6 +43,7 @@ class XrayTrainer(Trainer):
         settings: of the fit.
         rendering: of the rasterizer, in xray mode.
         flat: whether there is but one detector row.
+        extent: the length that positions' rates are measured in; see ``volume_extent``.
     """
 
     solves = True
@@ -40,8 +56,9 @@ class XrayTrainer(Trainer):
         rendering: SplatSettings,
         *,
         flat: bool,
+        extent: float,
     ) -> None:
-        super().__init__(pictures, parameters, settings, rendering, flat=flat)
+        super().__init__(pictures, parameters, settings, rendering, flat=flat, extent=extent)
         count = len(parameters)
         self._zero = self.device.zeros((count, 2)) if flat else None
         thin = np.full((count, 1), np.log(FLAT), np.float32)

@@ -50,7 +50,7 @@ class Footprints:
         first = [grid.coordinates(axis)[0] for axis in (2, 1, 0)]
         # In steps of the grid, from its first sample on.
         self._places = (np.asarray(means, float) - first) / self._spacing
-        shapes = _covariances(np.asarray(quats, float), np.asarray(scales, float))
+        shapes = covariances(np.asarray(quats, float), np.asarray(scales, float))
         wider = shapes + np.eye(3) * np.asarray(dilation)
         self._peaks = np.sqrt(np.linalg.det(shapes) / np.linalg.det(wider))
         self._inverses = np.linalg.inv(wider) * np.multiply.outer(self._spacing, self._spacing)
@@ -106,7 +106,7 @@ class Footprints:
         return flat, self._peaks[splats, None] * np.exp(-0.5 * square)
 
 
-def _covariances(quats: Floats, scales: Floats) -> Floats:
+def covariances(quats: Floats, scales: Floats) -> Floats:
     """R S S^T R^T of quaternions (w, x, y, z) and scales: (N, 3, 3)."""
     with np.errstate(all="ignore"):
         w, x, y, z = (quats / np.linalg.norm(quats, axis=1, keepdims=True)).T
