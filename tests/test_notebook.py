@@ -155,6 +155,7 @@ def test_a_terminal_of_ipython_is_no_notebook(notebook, capsys):
     assert "1/1 steps" in capsys.readouterr().err
 
 
+@pytest.mark.full
 @pytest.mark.once
 def test_a_function_shows_a_bar_if_it_is_asked_to(notebook, tmp_path, device):
     grid, scan = rift.Grid((16, 16)), rift.Parallel(np.linspace(0, 3, 20), 24)

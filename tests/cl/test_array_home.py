@@ -32,6 +32,7 @@ def small(device):
     return limited(device, 4 * SIZE)
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("step", STEPS)
 def test_runs_of_host_arrays_have_the_same_bits(device, small, step):
     x, y = normal(2, SIZE)
@@ -55,6 +56,7 @@ def test_sums_of_host_arrays_are_those_of_the_device(device, small):
     assert total(small, x[:0]) == 0
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("shape", [(23, 17, 5), (40, 31)])
 def test_total_variation_of_runs_of_slices_has_the_same_bits(device, small, shape):
     few = limited(device, 20 * 4 * int(np.prod(shape[1:])))

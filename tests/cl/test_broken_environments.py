@@ -74,6 +74,7 @@ def _one_warning(done):
     assert "set RIFT_CACHE_DIR to a folder that you own" in done.stderr
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("variable", ["HOME", "XDG_CACHE_HOME", "RIFT_CACHE_DIR"])
 def test_cache_that_cannot_be_made(python, tmp_path, pocl_only, variable):
     (tmp_path / "file").write_text("")
@@ -88,6 +89,7 @@ def test_drivers_own_cache_variable_does_no_harm(python, tmp_path, pocl_only):
     assert (done.stdout.strip(), done.stderr) == (WORKS, "")
 
 
+@pytest.mark.full
 def test_home_that_is_not_set(python, tmp_path, pocl_only):
     done = python(WORK, HOME=None, RIFT_CACHE_DIR=None, XDG_CACHE_HOME=str(tmp_path))
     assert (done.stdout.strip(), done.stderr) == (WORKS, "")
@@ -105,6 +107,7 @@ def test_no_folder_at_all(python):
     assert done.stdout.startswith("DeviceError compiled kernels can be kept neither in /proc/none")
 
 
+@pytest.mark.full
 @pytest.mark.skipif(not hasattr(os, "getuid") or os.getuid() != 0, reason="only root gives away")
 @pytest.mark.parametrize("given", ["", "rift_cl", "rift_cl/{version}"])
 def test_cache_of_another_user_is_refused(python, tmp_path, pocl_only, given):
@@ -133,6 +136,7 @@ def test_children_share_the_fallback_and_its_lock(python, tmp_path, pocl_only):
     assert done.stderr == ""
 
 
+@pytest.mark.full
 def test_relative_cache_survives_a_change_of_folder(python, tmp_path, pocl_only):
     code = f"import os; os.chdir({str(tmp_path)!r})\n"
     later = "import rift_cl as rift; rift.devices(); os.mkdir('below'); os.chdir('below')\n"

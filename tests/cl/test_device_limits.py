@@ -144,6 +144,7 @@ JOBS: dict[str, Callable[[rift.Device], Arrays]] = {
 every_job = pytest.mark.parametrize("job", JOBS.values(), ids=list(JOBS))
 
 
+@pytest.mark.full
 @pytest.mark.parametrize(
     ("job", "largest"),
     [

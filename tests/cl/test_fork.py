@@ -57,6 +57,7 @@ def test_forked_child_gets_a_named_error_and_the_parent_works_on(python, before)
     assert (done.stdout.strip(), done.stderr) == ("True", "")
 
 
+@pytest.mark.full
 def test_fork_before_the_first_use_works(python):
     done = python(
         "import os, rift_cl as rift\n"
@@ -81,6 +82,7 @@ def test_forked_child_may_still_exit_in_the_ordinary_way(python):
     assert done.stdout.split() == ["7"], done.stderr
 
 
+@pytest.mark.full
 @pytest.mark.parametrize(
     "operator",
     ["A", "A.T", "2 * A.T @ A", "FilteredBackprojection(A) @ A", "rift.vstack(A, A)"],
@@ -103,6 +105,7 @@ def test_a_forked_pool_is_told_and_does_not_wait_for_ever(python, operator):
     assert done.stdout.split() == ["ForkedContextError"], done.stderr
 
 
+@pytest.mark.full
 def test_spawned_worker_works_on_the_device_it_is_sent(tmp_path):
     script = tmp_path / "spawning.py"
     script.write_text(

@@ -78,6 +78,7 @@ def test_child_whose_process_is_killed_leaves_nothing_behind(python, tmp_path):
     assert not place.exists()
 
 
+@pytest.mark.full
 def test_process_that_ends_leaves_nothing_behind_and_warns_of_nothing(python, tmp_path):
     done = python(
         "import rift_cl as rift\n"
@@ -215,6 +216,7 @@ def test_a_repeated_grid_is_the_smallest_that_is_compiled_for_alike(size, local,
     assert way_of(alike, None) == way_of(size, None)
 
 
+@pytest.mark.full
 @pytest.mark.parametrize(("offset", "died"), [(None, True), ([4], True), (None, False)])
 def test_our_own_child_repeats_a_launch_that_a_process_died_of(offset, died):
     device = rift.default_device()
@@ -232,6 +234,7 @@ def test_our_own_child_repeats_a_launch_that_a_process_died_of(offset, died):
     assert built.binary
 
 
+@pytest.mark.full
 def test_our_own_child_compiles_and_tells_what_does_not():
     import pyopencl as cl
 

@@ -70,6 +70,7 @@ def _files(root):
     return {path: data for path, data in found.items() if data and path.suffix in (".bc", ".so")}
 
 
+@pytest.mark.full
 def test_cache_is_closed_to_others(warm):
     folder = warm / "rift_cl" / __version__
     assert stat.S_IMODE(folder.stat().st_mode) == 0o700
@@ -102,6 +103,7 @@ def test_second_run_builds_nothing(cache, python):
     assert _files(cache) == before
 
 
+@pytest.mark.full
 def test_a_driver_keeps_programs_whoever_asked_before(cache, python):
     code = (
         "from rift_cl.cl.build.driver_record import forget_record, keeps_programs\n"
@@ -137,6 +139,7 @@ def test_next_run_after_clearing_works_in_the_same_process_and_in_another(cache,
     _works(python(PROGRAM, RIFT_CACHE_DIR=str(cache)))
 
 
+@pytest.mark.full
 def test_cache_that_is_deleted_under_a_running_process(cache, python):
     code = (
         "import shutil, rift_cl as rift\n"
@@ -154,6 +157,7 @@ def _one(cache, name):
     return sorted(ours if name == "program.bc" else found)[0]
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("name", FILES)
 @pytest.mark.parametrize("damage", DAMAGES)
 def test_damaged_kernel_is_built_again(cache, python, name, damage):
@@ -164,6 +168,7 @@ def test_damaged_kernel_is_built_again(cache, python, name, damage):
     assert path.stat().st_size > len(whole) // 2
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("name", FILES)
 def test_missing_file_is_built_again(cache, python, name):
     for path in cache.rglob(name):
@@ -184,6 +189,7 @@ def _pipe_instead(path):
 OTHERS = {"folder": _folder_instead, "pipe": _pipe_instead}
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("name", [*FILES, "checksums.json", "build.lock"])
 @pytest.mark.parametrize("other", OTHERS)
 def test_what_is_no_file_is_removed_and_built_again(cache, python, name, other):

@@ -213,6 +213,7 @@ def test_kernel_without_its_entry_point_is_a_named_error(fresh, kernels):
         fresh.launch("probe", (1,), p=fresh.zeros(1, np.int32))
 
 
+@pytest.mark.full
 def test_failed_build_leaves_the_device_usable(fresh, kernels):
     from rift_cl.cl.self_test import self_test
 

@@ -57,6 +57,7 @@ def _transposer(device, number):
     return launch, image.T
 
 
+@pytest.mark.full
 def test_launches_keep_their_own_arguments(device, restless):
     wrong = [0] * THREADS
 

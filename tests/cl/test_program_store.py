@@ -227,6 +227,7 @@ __kernel void axpby(__global float *y, uint size)
 """
 
 
+@pytest.mark.full
 def test_first_launch_that_a_childs_compiler_dies_of_takes_a_workaround(
     device, kept, folder, monkeypatch
 ):

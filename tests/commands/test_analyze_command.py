@@ -94,6 +94,7 @@ def found_of(source, **settings):
     return sampled, resolution(sampled, ("a", "b", "c")).figures["limits"]
 
 
+@pytest.mark.full
 def test_lengths_are_millimetres_once_the_unit_is_known(ringed):
     units, in_units = found_of(ringed, aperture=0.02)
     mm, in_mm = found_of(ringed, aperture=0.02, unit=100.0)
@@ -129,6 +130,7 @@ def test_one_camera_still_gets_an_answer(tmp_path, capsys):
     assert "A single camera" in capsys.readouterr().err
 
 
+@pytest.mark.full
 def test_a_parallel_scan_has_directions_and_no_cameras(scan, tmp_path, capsys):
     assert analyze(scan.integrals, tmp_path / "all") == 0
     found = metrics_of(tmp_path / "all")
@@ -284,6 +286,7 @@ def test_of_a_narrow_wedge_the_detail_within_it_is_said_and_the_share_outside(sc
     assert "Within those that are" in words and f"{1 / first['reached']:.3g}" not in words
 
 
+@pytest.mark.full
 def test_a_cone_beam_is_a_volume_whose_source_misses_planes(tmp_path, capsys):
     path, angles = tmp_path / "cone.npz", np.linspace(0, 2 * np.pi, 40, endpoint=False)
     lengths = {"source_to_axis": 30.0, "source_to_detector": 60.0, "pitch": 1.0}

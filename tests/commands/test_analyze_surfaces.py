@@ -64,6 +64,7 @@ def splats_of(points):
     )
 
 
+@pytest.mark.full
 def test_no_camera_is_suggested_behind_a_wall_that_sparse_points_show(walled, tmp_path):
     out = tmp_path / "out"
     words = ["analyze", str(walled), "--out", str(out), "--diameter", "1.2", "--add", "3"]
@@ -172,6 +173,7 @@ def test_a_scan_has_no_surface(scan, tmp_path, capsys):
     assert "--mode surface" in capsys.readouterr().err
 
 
+@pytest.mark.full
 def test_two_views_far_apart_tell_more_of_depth_than_two_side_by_side(tmp_path):
     depths = []
     for reach in (2.0, 30.0):

@@ -168,6 +168,7 @@ def test_an_older_fit_says_what_it_lacks_and_still_works(older, home, tmp_path, 
     assert "is no fit's folder" in capsys.readouterr().err
 
 
+@pytest.mark.full
 def test_a_fit_that_held_nothing_out_has_nothing_to_score(home, tmp_path, capsys):
     words = ("--steps", "1", "--splats", "9", "--hold-out", "0", "--checkpoint-every", "0")
     assert run("fit", home / "photographs", "--out", tmp_path / "fit", *words) == 0
@@ -192,6 +193,7 @@ def test_cameras_in_one_place_are_told_by_every_command(home, tmp_path, capsys, 
     assert not (tmp_path / "out").exists()
 
 
+@pytest.mark.full
 def test_a_film_is_made_again_from_its_key_frames(alone, tmp_path):
     film, again = tmp_path / "film", tmp_path / "again"
     assert run("render", alone, "--out", film, "--frames", 25, "--size", 20, 16) == 0

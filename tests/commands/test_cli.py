@@ -101,6 +101,7 @@ def test_a_path_too_many_is_taken_for_an_output(arguments, hint, capsys):
     assert hint in said if hint else "too many" not in said
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("options", [[], ["--out", "fit"], ["--quiet", "--out", "fit"]])
 def test_a_folder_called_as_the_command_is_the_capture(options, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)

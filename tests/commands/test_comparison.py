@@ -95,6 +95,7 @@ def mixed(capture, tmp_path_factory):
     return folder
 
 
+@pytest.mark.full
 def test_photographs_of_other_sizes_are_told_by_fit_and_eval(mixed, tmp_path, capsys):
     """Of those held out, 2 lies between photographs of both sizes."""
     words = ["--steps", "5", "--splats", "100", "--hold-out", "2", "--downscale", "1"]

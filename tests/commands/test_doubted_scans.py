@@ -66,6 +66,7 @@ def scans(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     return written
 
 
+@pytest.mark.full
 @pytest.mark.parametrize(
     ("beam", "options"),
     [
@@ -100,6 +101,7 @@ def test_an_encoder_that_stuck_is_doubted(scans: dict[str, Path], tmp_path: Path
     assert "20 views have the angle of another one" in " ".join(made.notes)
 
 
+@pytest.mark.full
 def test_least_squares_that_stop_at_no_noise_say_what_the_data_show(tmp_path: Path) -> None:
     angles, noise = np.pi * np.arange(60) / 60, 0.02
     views = rift.phantom.project(

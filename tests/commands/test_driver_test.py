@@ -101,6 +101,7 @@ def test_driver_that_keeps_nothing_is_met_once(tested, monkeypatch):
 
 
 # Off by a little, and so that the host's square root of the sum fails.
+@pytest.mark.full
 @pytest.mark.parametrize("fault", ["1.001f * (over_lanes(sum) + tail)", "-1"])
 def test_wrong_numbers_are_found_and_refused_by_name(tested, monkeypatch, fault):
     real, wanted = source.kernel_source, stored_results()

@@ -55,6 +55,7 @@ def test_a_scale_multiplies_the_places_of_a_surface(bone):
     np.testing.assert_array_equal(quarter.bounds, whole.bounds / 4)
 
 
+@pytest.mark.full
 def test_without_a_level_inside_and_outside_are_parted(bone, capsys):
     assert main(["export", "bone.ply", "--mesh", "--out", "a.stl", "--to", "stl", "--quiet"]) == 0
     said = capsys.readouterr().out

@@ -117,6 +117,7 @@ def scaled_view(view, factor):
     return moved
 
 
+@pytest.mark.full
 def test_cameras_that_disagree_make_one_surface_and_not_a_shell_each():
     """A reach of four voxels shows the innermost shell, in pieces; the spheres' mean is 0.925."""
     views = cameras(16)

@@ -116,6 +116,7 @@ def test_lobes_become_the_nearest_harmonics() -> None:
     assert psnr(drawn(found), drawn(given)) > 30
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("activation", ["exp", "square"])
 def test_activations_become_gaussians_of_the_same_peak_and_integral(activation: str) -> None:
     given = scene(1, activation=activation, means=np.zeros((1, 3)), logit_opacities=[2.5],
@@ -148,6 +149,7 @@ def test_modes_become_the_gaussian_of_the_same_moments() -> None:
     np.testing.assert_allclose(found.sh[0, 0], constant, atol=1e-5)
 
 
+@pytest.mark.full
 def test_modes_made_plain_look_like_what_they_were() -> None:
     random = np.random.default_rng(9)
     given = scene(shape_modes=random.normal(0, 0.2, (60, 9)))

@@ -93,6 +93,7 @@ def test_a_fit_that_was_broken_off_goes_on_to_the_same_bits(capture, tmp_path, m
     assert (cut / "scene.ply").read_bytes() == (whole / "scene.ply").read_bytes()
 
 
+@pytest.mark.full
 def test_another_basis_cannot_go_on(capture, tmp_path, capsys):
     broken_off(settings(capture, tmp_path / "fit"), 25)
     more = ["--steps", "60", "--resume", "--activation", "exp"]

@@ -48,6 +48,7 @@ def views_of(folder, cameras, **more):
     )
 
 
+@pytest.mark.full
 def test_the_cameras_of_a_fit_are_those_of_its_capture(capture, fitted):
     cameras = open_fit_cameras(fitted)
     expected = open_capture(capture).views
@@ -141,6 +142,7 @@ def test_lenses_masks_and_points_come_back(tmp_path):
         assert (found.placed, found.photographs, found.reprojection_error) == (6, 9, 0.75)
 
 
+@pytest.mark.full
 def test_a_fit_that_moves_with_its_photographs_finds_them(capture, fitted, tmp_path):
     home = tmp_path / "home"
     shutil.copytree(capture, home / "photographs")
@@ -258,6 +260,7 @@ def test_cameras_in_one_place_tell_no_depth_and_nothing_is_written(capture, tmp_
     assert not (tmp_path / "fit").exists()
 
 
+@pytest.mark.full
 def test_a_single_photograph_is_told_to_tell_no_depth(capture, tmp_path, capsys):
     place = tmp_path / "photograph"
     shutil.copytree(capture, place)
@@ -269,6 +272,7 @@ def test_a_single_photograph_is_told_to_tell_no_depth(capture, tmp_path, capsys)
     assert not place_notes(ring(2)) and not place_notes([])
 
 
+@pytest.mark.full
 def test_a_fit_that_is_refused_before_it_begins_leaves_no_folder(capture, tmp_path, capsys):
     """Cameras that look outward, without points: that is found when the work begins."""
     place, out = tmp_path / "photographs", tmp_path / "fit"

@@ -55,6 +55,7 @@ def test_a_dry_run_writes_nothing(capture, tmp_path, capsys):
     assert not (tmp_path / "fit").exists()
 
 
+@pytest.mark.full
 def test_more_captures_are_scored_beside_it(capture, tmp_path):
     assert fit(capture, tmp_path / "fit", "--test", str(capture), "--views", "3") == 0
     metrics = json.loads((tmp_path / "fit" / "metrics.json").read_text())
@@ -102,6 +103,7 @@ def test_the_ring_is_where_the_capture_says(capture):
         assert local[2] > 4
 
 
+@pytest.mark.full
 def test_the_captures_own_lists_are_followed_unless_told_otherwise(capture, tmp_path, capsys):
     """As nerfstudio would: by 'train_filenames' and 'test_filenames'."""
     listed = tmp_path / "listed"
@@ -125,6 +127,7 @@ def test_the_captures_own_lists_are_followed_unless_told_otherwise(capture, tmp_
     assert "6 photographs" in capsys.readouterr().out
 
 
+@pytest.mark.full
 def test_a_list_of_no_frame_is_told_of_before_a_fit_that_scores_nothing(capture, tmp_path, capsys):
     listed = tmp_path / "listed"
     shutil.copytree(capture, listed)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 
 from rift_cl.commands.cli import main
 from rift_cl.commands.inputs.opened_scene import OpenedScene
@@ -13,6 +14,7 @@ from rift_cl.io.scenes.splat_scene import SplatScene
 FIT = ["--steps", "20", "--splats", "60", "--hold-out", "4", "--quiet"]
 
 
+@pytest.mark.full
 def test_a_moved_scene_is_exported_as_from_its_folder(capture, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     how = ["--light", "linear", "--rendering.antialiased"]

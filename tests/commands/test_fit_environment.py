@@ -47,6 +47,7 @@ def test_eval_scores_what_the_fit_scored(capture, fitted, tmp_path):
     assert found["fit_psnr"] == pytest.approx(scores["fit_psnr"], abs=2e-3)
 
 
+@pytest.mark.full
 def test_a_rendering_takes_another_light(fitted, tmp_path):
     frames = []
     write_png(tmp_path / "red.png", np.broadcast_to([1.0, 0, 0], (8, 16, 3)))

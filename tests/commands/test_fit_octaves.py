@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import json
 
+import pytest
+
 from rift_cl.commands.cli import main
 
 FIT = ["--steps", "20", "--splats", "60", "--hold-out", "4", "--quiet"]
 
 
+@pytest.mark.full
 def test_a_fit_says_how_often_its_photographs_were_halved(capture, tmp_path):
     out = tmp_path / "fit"
     halved = ["--octaves", "1", "--octaves.last", "0.3"]
@@ -21,6 +24,7 @@ def test_a_fit_says_how_often_its_photographs_were_halved(capture, tmp_path):
     assert (again / "scene.ply").read_bytes() == (out / "scene.ply").read_bytes()
 
 
+@pytest.mark.full
 def test_small_photographs_have_their_full_size_by_default(capture, tmp_path):
     out = tmp_path / "fit"
     assert main(["fit", str(capture), "--out", str(out), *FIT]) == 0

@@ -33,6 +33,7 @@ def told(capture, out, capsys, *more):
     return said.out + said.err
 
 
+@pytest.mark.full
 def test_exposures_that_change_are_told(capture, tmp_path, capsys):
     exposed = changed(capture, tmp_path / "exposed", lambda k, image: image * (0.6 + 0.4 * (k % 2)))
     assert "--refine-exposures" in told(exposed, tmp_path / "fit", capsys)
@@ -58,6 +59,7 @@ def test_exposures_that_are_fitted_are_not_told(capture, tmp_path, capsys):
     assert longer > 1.15 * shorter
 
 
+@pytest.mark.full
 def test_photographs_of_nothing_are_told(capture, tmp_path, capsys):
     blank = changed(capture, tmp_path / "blank", lambda k, image: 0 * image + 0.5)
     assert "background" in told(blank, tmp_path / "fit", capsys, "--steps", 5)
@@ -114,6 +116,7 @@ def test_a_few_sparse_points_are_not_begun_at_and_that_is_said(capture, tmp_path
     assert ("3 sparse points are too few to begin at" in said) == (count == 3)
 
 
+@pytest.mark.full
 @pytest.mark.filterwarnings("always:.*its mask is black")
 @pytest.mark.parametrize("black", [[0], [0, 3, 6]])
 def test_photographs_with_a_black_mask_are_not_scored(capture, tmp_path, capsys, black):
@@ -130,6 +133,7 @@ def test_photographs_with_a_black_mask_are_not_scored(capture, tmp_path, capsys,
     assert (main(words) == 0) == (len(black) == 1)
 
 
+@pytest.mark.full
 def test_a_fit_that_is_no_better_than_its_neighbours_is_told(capture, tmp_path, capsys):
     shuffled = tmp_path / "shuffled"
     shuffled.mkdir()

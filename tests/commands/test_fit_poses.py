@@ -124,6 +124,7 @@ def test_coordinates_that_float32_cannot_tell_apart_are_told_with_what_to_subtra
         check_poses(moved(ring(), 1e6), None, WHERE)
 
 
+@pytest.mark.full
 def test_of_two_photographs_none_is_held_out(capture, tmp_path, capsys):
     two = reposed(capture, tmp_path / "two", 1.0, 2)
     assert fitted(two, tmp_path / "fit") == {}

@@ -16,6 +16,7 @@ def trainer_of(capture, out, **more):
     return job._trainer(job.source, job._pictures(job.training_views))
 
 
+@pytest.mark.full
 def test_steps_are_tried_as_at_the_beginning_and_as_at_the_end(capture, tmp_path):
     trainer = trainer_of(capture, tmp_path / "fit", first_splats=0.25)
     first, reading = len(trainer.parameters), itertools.count()

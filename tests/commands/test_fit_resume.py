@@ -101,6 +101,7 @@ def test_a_fit_that_was_broken_off_goes_on_to_the_same_bits(capture, tmp_path, v
     assert digest(whole) == digest(cut)
 
 
+@pytest.mark.full
 def test_other_settings_cannot_go_on(capture, tmp_path, capsys):
     broken_off(settings(capture, tmp_path / "fit"), 25)
     before = contents(tmp_path / "fit")
@@ -111,6 +112,7 @@ def test_other_settings_cannot_go_on(capture, tmp_path, capsys):
         assert contents(tmp_path / "fit") == before
 
 
+@pytest.mark.full
 def test_a_fit_goes_on_with_what_it_began_with_alone(capture, tmp_path, capsys):
     """Photographs and cameras by their contents: a copy with other times is the same."""
     given = {"steps": 100, "splats": 200, "hold_out": 4}
@@ -242,6 +244,7 @@ def test_the_second_part_may_be_broken_off_as_well(capture, tmp_path):
     assert metrics_of(cut)["history"] == [[50, 50], [125, 125]]
 
 
+@pytest.mark.full
 def test_a_fit_that_was_broken_off_may_become_longer(capture, tmp_path):
     broken_off(settings(capture, tmp_path / "fit", steps=100), 50)
     job, _ = run(settings(capture, tmp_path / "fit", steps=125, resume=True))

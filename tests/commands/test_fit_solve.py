@@ -37,6 +37,7 @@ def settings(path, out, **more):
     return FitXraySettings.of(path, out, basis="hermite", **(given | more))
 
 
+@pytest.mark.full
 def test_solving_serves_projections_that_were_not_looked_at(scan, tmp_path):
     found = []
     for every in ("0", "20"):

@@ -89,6 +89,7 @@ def test_a_scan_becomes_densities_slices_and_a_report(scans, tmp_path, capsys, r
     assert config["complete"] and config["job"] == "fit xray"
 
 
+@pytest.mark.full
 def test_one_row_stays_in_its_slice(scans, tmp_path):
     assert fit(scans[1][0], tmp_path / "fit") == 0
     scene = rift.SplatScene.load(tmp_path / "fit" / "scene.ply")
@@ -162,6 +163,7 @@ def test_a_dry_run_writes_nothing(scans, tmp_path, capsys):
     assert not (tmp_path / "fit").exists()
 
 
+@pytest.mark.full
 def test_a_scan_of_counts_finds_its_own_axis(scan, tmp_path):
     """Flat and dark frames, the logarithm and the rotation axis come from the scan."""
     given = settings(scan.counts, tmp_path / "fit", center=None, rows=(1, 2), format="h5")
@@ -338,6 +340,7 @@ def test_densities_below_zero_are_told_and_streaks_are_not(tmp_path, what):
     assert all(-0.1 < value < -0.05 for value in lowest)
 
 
+@pytest.mark.full
 def test_volumes_lie_where_those_of_reconstruct_do(scans, cone, tmp_path):
     (parallel, _), (point, _) = scans[4], cone
     axis, few = (SIZE - 1) / 2, {"steps": 1, "hold_out": 0, "format": "h5"}

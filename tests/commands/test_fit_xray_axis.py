@@ -100,6 +100,7 @@ def silent_cone(tmp_path):
     }
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("sense", [1, -1])
 def test_axis_and_sense_of_a_cone_are_found(silent_cone, tmp_path, sense):
     out = tmp_path / "fit"
@@ -112,6 +113,7 @@ def test_axis_and_sense_of_a_cone_are_found(silent_cone, tmp_path, sense):
     assert settled(out)["reversed"] == (sense < 0)
 
 
+@pytest.mark.full
 def test_an_axis_that_the_data_of_a_cone_contradict_is_doubted(silent_cone, tmp_path):
     _, said, metrics = fitted(silent_cone[1], tmp_path / "fit", center=19.5)
     assert metrics["center"] == 19.5
@@ -153,6 +155,7 @@ def test_a_tilted_axis_is_turned_as_slices_have_it(tmp_path):
     )
 
 
+@pytest.mark.full
 def test_rows_next_to_those_that_are_fitted_are_read_where_they_are_turned(tmp_path):
     path = saved(tmp_path / "leaning.npz", *leaning(3.0), pitch=1.0)
     job, _, _ = fitted(path, tmp_path / "all")
@@ -228,6 +231,7 @@ def test_cones_that_no_formula_takes_are_fitted(tmp_path, kind):
     assert metrics["scores"]["held out"]["fbp_error"] < 0.15
 
 
+@pytest.mark.full
 def test_rows_that_are_farther_apart_than_bins_are_fitted_where_they_are(tmp_path):
     """A scan by pixels twice as high, beside one of all rows."""
     balls = [

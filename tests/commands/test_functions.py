@@ -21,6 +21,7 @@ def fitted(capture, tmp_path_factory):
     return rift.fit(capture, tmp_path_factory.mktemp("fits") / "fit", **SMALL)
 
 
+@pytest.mark.full
 def test_a_fit_is_the_commands_and_prints_nothing(fitted, capture, tmp_path, capsys):
     reports = []
     again = rift.fit(capture, tmp_path / "a", progress=reports.append, **SMALL)
@@ -180,6 +181,7 @@ def plain_interrupt():
     assert after is signal.default_int_handler
 
 
+@pytest.mark.full
 @pytest.mark.usefixtures("plain_interrupt")
 @pytest.mark.parametrize("at_step", [lambda report: False, interrupted], ids=["asked", "signal"])
 def test_a_fit_that_is_broken_off_keeps_a_checkpoint(at_step, fitted, capture, tmp_path, capsys):
@@ -192,6 +194,7 @@ def test_a_fit_that_is_broken_off_keeps_a_checkpoint(at_step, fitted, capture, t
     assert not any("no checkpoint" in note for note in made.notes)
 
 
+@pytest.mark.full
 def test_a_fit_without_a_checkpoint_to_go_on_from_says_so(fitted, capture, tmp_path):
     def fail(report):
         raise RuntimeError("a mistake of the caller's")
@@ -203,6 +206,7 @@ def test_a_fit_without_a_checkpoint_to_go_on_from_says_so(fitted, capture, tmp_p
     assert any("no checkpoint to go on from" in note for note in made.notes)
 
 
+@pytest.mark.full
 def test_a_handler_of_the_caller_s_hears_the_interrupt(fitted, capture, tmp_path):
     heard = []
     usual = signal.signal(signal.SIGINT, lambda *_: heard.append(True))

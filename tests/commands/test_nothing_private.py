@@ -78,6 +78,7 @@ def assert_tells_nothing(path: Path, words: tuple[str, ...]) -> None:
             assert not (facts or facts.get_ifd(0x8769) or facts.get_ifd(0x8825)), path.name
 
 
+@pytest.mark.full
 def test_fits_films_and_scores_tell_neither_place_nor_name(photographs, tmp_path, monkeypatch):
     monkeypatch.syspath_prepend(str(STAND_IN))
     monkeypatch.setenv("FAKE_PYCOLMAP_SEEN", str(tmp_path / "seen.json"))

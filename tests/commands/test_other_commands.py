@@ -72,6 +72,7 @@ def test_demo_fits_the_sample_and_shows_both_ways(tmp_path, capsys):
     assert not (out / "film").exists()
 
 
+@pytest.mark.full
 def test_demo_keeps_what_else_lies_under_the_fits_name(tmp_path, capsys):
     out = tmp_path / "demo"
     arguments = ["demo", "--out", str(out), "--size", "32", "--views", "4", *NO_FIT]
@@ -82,6 +83,7 @@ def test_demo_keeps_what_else_lies_under_the_fits_name(tmp_path, capsys):
     assert (out / "ornament" / "notes.txt").read_text() == "keep"
 
 
+@pytest.mark.full
 def test_demo_can_be_repeated_but_takes_no_other_folder(tmp_path, capsys):
     arguments = ["demo", "--out", str(tmp_path / "demo"), "--size", "32", "--views", "4"]
     assert main([*arguments, *NO_FIT]) == 0
@@ -107,6 +109,7 @@ def test_demo_arguments_are_told(tmp_path, capsys, arguments, word):
     assert not (tmp_path / "demo").exists()
 
 
+@pytest.mark.full
 def test_a_demo_that_is_repeated_leaves_no_old_pictures(tmp_path, capsys):
     out = tmp_path / "demo"
     for views in ("3", "5"):
@@ -157,6 +160,7 @@ def test_any_other_error_of_the_interpreter_is_a_defect(monkeypatch):
         main(["cache"])
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("encoding", ["ascii", "utf-8"])
 @pytest.mark.skipif(sys.platform != "linux", reason="names are bytes on Linux alone")
 def test_a_folder_whose_name_is_not_utf8(python, tmp_path, encoding):
@@ -173,6 +177,7 @@ def test_a_folder_whose_name_is_not_utf8(python, tmp_path, encoding):
     assert "Traceback" not in done.stderr and "udce9" in done.stderr
 
 
+@pytest.mark.full
 def test_a_terminal_of_ascii_gets_a_sentence_and_a_table(python, scan, tmp_path):
     out = os.fsencode(tmp_path) + b"/caf\xe9 \xc2\xb0"
     done = python(
@@ -263,6 +268,7 @@ def test_help_has_an_example(command, capsys):
     assert "Example:" in capsys.readouterr().out
 
 
+@pytest.mark.full
 def test_every_way_to_ask_gives_the_same_axis(scan, tmp_path, capsys):
     from rift_cl.commands.analyze.input import open_sampled
     from rift_cl.commands.analyze.settings import AnalyzeSettings

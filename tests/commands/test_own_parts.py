@@ -53,6 +53,7 @@ def scan(tmp_path):
     return path
 
 
+@pytest.mark.full
 def test_a_filter_of_ones_own_works_in_a_shell_as_in_python(own, scan, tmp_path, capsys):
     words = ["reconstruct", str(scan), "--center", "23.5", "--filter", "parzen", "--out"]
     assert main([*words, str(tmp_path / "no")]) == InputError.exit_status
@@ -113,6 +114,7 @@ def test_two_files_of_one_name_are_not_taken_for_one(own, tmp_path, capsys):
     assert "loaded already" in capsys.readouterr().err
 
 
+@pytest.mark.full
 @pytest.mark.filterwarnings("always:--config")
 def test_a_part_that_was_changed_since_is_told(own, scan, tmp_path, capsys):
     """The name that a run is repeated by means another filter then."""

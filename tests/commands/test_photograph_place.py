@@ -45,6 +45,7 @@ def masked(tmp_path_factory):
     return home
 
 
+@pytest.mark.full
 def test_a_fit_of_masked_photographs_serves_as_a_capture(masked, tmp_path):
     assert len(open_capture(masked / "fit", photographs=False).views) == len(made.NAMES)
     assert open_sampled(AnalyzeSettings(masked / "fit", out=tmp_path / "a")).views == 3
@@ -73,6 +74,7 @@ def test_photographs_with_masks_may_be_put_into_the_fit(masked, tmp_path):
         assert view.mask == own / "masks" / f"{view.name}.png" and view.mask.is_file()
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("place", [{"folder": "x" * 5000}, {"below": "x" * 5000}])
 def test_a_fit_whose_photographs_cannot_be_reached_is_opened_without(masked, tmp_path, place):
     """As a folder of another user is, whose name is too long here to be asked for."""

@@ -52,6 +52,7 @@ def on_orbit(cone, tmp_path_factory):
     return out
 
 
+@pytest.mark.full
 def test_a_scan_is_read_as_options_say(tmp_path, capsys):
     """Its angles are degrees, and over so short an arc nothing tells."""
     path = tmp_path / "short.npz"
@@ -65,6 +66,7 @@ def test_a_scan_is_read_as_options_say(tmp_path, capsys):
         assert "--angle-unit applies to" in capsys.readouterr().err or have
 
 
+@pytest.mark.full
 def test_views_on_the_orbit_fill_the_widest_gap(on_orbit):
     """Sources were at azimuths from -90 to 22 degrees, and opposite ones are as good."""
     for view in views_of(on_orbit):
@@ -115,6 +117,7 @@ def test_a_plan_of_no_scanner_keeps_no_vectors_of_an_earlier_one(on_orbit, tmp_p
     assert (out / "transforms.json").exists() and not (out / "vectors.txt").exists()
 
 
+@pytest.mark.full
 def test_tilts_cross_planes_that_the_orbit_does_not(cone, on_orbit, tmp_path, capsys):
     assert plan(cone, tmp_path / "a", "--elevation", 0, 90) == 0
     assert "vectors.txt" in capsys.readouterr().out

@@ -86,6 +86,7 @@ def test_a_run_goes_on_with_a_part_that_a_worker_made(scan, tmp_path, monkeypatc
     assert volume.tobytes() == made(Reconstruction(settings(scan, tmp_path / "b")))[0].tobytes()
 
 
+@pytest.mark.full
 def test_a_worker_tells_which_weights_it_chose(scan, tmp_path):
     tv = {"method": "tv", "steps": 2}
     _, token = begin_anew(settings(scan, tmp_path / "out", **tv))
@@ -96,6 +97,7 @@ def test_a_worker_tells_which_weights_it_chose(scan, tmp_path):
     assert job.inversion.figures()["weight"] == pytest.approx(sum(receipt.weights.values()) / 2)
 
 
+@pytest.mark.full
 def test_a_worker_leaves_doubts_to_the_process_that_began_the_run(scan, tmp_path, monkeypatch):
     """They take as long as the search for the axis."""
     kept, token = begin_anew(settings(scan, tmp_path / "out"))
@@ -147,6 +149,7 @@ def begin_anew(given):
     return begun.kept, begun.kept.mark()
 
 
+@pytest.mark.full
 def test_a_worker_that_stays_joins_the_later_run_too(scan, tmp_path):
     """Angles that were mended in their file are read again."""
     angles, out = tmp_path / "angles.txt", tmp_path / "out"
@@ -188,6 +191,7 @@ def test_a_slice_that_two_workers_kept_comes_once(tmp_path):
     assert not kept.missing()
 
 
+@pytest.mark.full
 def test_the_option_is_checked_and_not_repeated(scan, tmp_path):
     with pytest.raises(InputError, match="local:N"):
         Reconstruction(settings(scan, tmp_path / "a", cluster="two"))

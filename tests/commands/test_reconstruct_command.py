@@ -44,6 +44,7 @@ def test_the_report_stands_alone(scan, tmp_path):
     assert config["environment"]["device"]
 
 
+@pytest.mark.full
 def test_two_runs_give_the_same_bits(scan, tmp_path):
     for name in "ab":
         assert run("reconstruct", scan.counts, "--out", tmp_path / name, "--quiet") == 0
@@ -64,6 +65,7 @@ def test_a_small_budget_gives_the_same_bits(scan, tmp_path):
     np.testing.assert_array_equal(a, b)
 
 
+@pytest.mark.full
 def test_rows_and_methods(scan, tmp_path):
     common = ("reconstruct", scan.counts, "--center", 45, "--rows", 1, 2)
     for method in ("fbp", "backproject"):
@@ -87,6 +89,7 @@ def test_dry_run_writes_nothing(scan, tmp_path, capsys):
         assert word in printed
 
 
+@pytest.mark.full
 def test_progress_is_plain_where_there_is_no_terminal(scan, tmp_path, capsys):
     assert run("reconstruct", scan.counts, "--center", 45, "--out", tmp_path) == 0
     captured = capsys.readouterr()

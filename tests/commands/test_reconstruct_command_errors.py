@@ -37,6 +37,7 @@ def _few_angles(group):
     group["theta"] = theta
 
 
+@pytest.mark.full
 @pytest.mark.parametrize(
     ("change", "words"),
     [

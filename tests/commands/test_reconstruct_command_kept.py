@@ -56,6 +56,7 @@ def contents(folder):
     return {path: path.read_bytes() for path in folder.rglob("*") if path.is_file()}
 
 
+@pytest.mark.full
 @pytest.mark.parametrize(
     "mistake", [("--rows", 0, 2), ("--size", 10), ("--center", 44), ("--filter", "hann")]
 )
@@ -80,6 +81,7 @@ def test_a_failure_of_a_run_that_went_on_loses_nothing(scan, tmp_path, monkeypat
     assert contents(tmp_path / "out") == before
 
 
+@pytest.mark.full
 def test_what_a_killed_run_left_of_another_format_goes(scan, tmp_path, monkeypatch):
     out = tmp_path / "out"
     arguments = ("reconstruct", scan.counts, "--center", 45, "--out", out)
@@ -92,6 +94,7 @@ def test_what_a_killed_run_left_of_another_format_goes(scan, tmp_path, monkeypat
     assert (out / "slices").is_dir() and not list(out.glob("volume.*"))
 
 
+@pytest.mark.full
 def test_a_run_that_goes_on_begins_to_count_where_it_stands(scan, tmp_path, monkeypatch):
     """So that its pace is its own: the first report is what the rate is counted from."""
     out = tmp_path / "out"
@@ -189,6 +192,7 @@ def test_what_was_assumed_is_announced(tmp_path, capsys):
     assert "No angles were found" in captured.out + captured.err
 
 
+@pytest.mark.full
 def test_a_part_of_an_offset_slice_may_lie_beyond_the_detector(tmp_path, capsys):
     path = tmp_path / "scan.npz"
     save_phantom(path, FULL, 40, 6.4)
@@ -206,6 +210,7 @@ def test_a_part_of_an_offset_slice_may_lie_beyond_the_detector(tmp_path, capsys)
     assert not (tmp_path / "no").exists()
 
 
+@pytest.mark.full
 def test_a_found_axis_is_told_with_its_interval(tmp_path):
     path = tmp_path / "scan.npz"
     save_phantom(path, HALF, 40, size=80)
@@ -226,6 +231,7 @@ def test_a_background_that_is_given_takes_the_place_of_the_layouts(tmp_path, bac
     assert scan.background == (20 if background is None else background)
 
 
+@pytest.mark.full
 def test_curves_and_pictures_are_named_by_the_same_rows(scan, tmp_path, monkeypatch):
     settings = ReconstructSettings(
         scan.integrals, out=tmp_path / "out", center=45, rows=(1, 3), method="cgls", steps=2
@@ -253,6 +259,7 @@ def test_a_series_named_after_a_dark_object_is_the_projections(tmp_path, capsys)
     assert "flats or darks alone" in capsys.readouterr().err
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("format", ["tiff", "h5"])
 def test_a_foreign_file_among_the_slices_stops_before_the_work(scan, tmp_path, monkeypatch, format):
     arguments = ("reconstruct", scan.counts, "--center", 45, "--out", tmp_path / "out")
@@ -264,6 +271,7 @@ def test_a_foreign_file_among_the_slices_stops_before_the_work(scan, tmp_path, m
     assert contents(tmp_path / "out") == before
 
 
+@pytest.mark.full
 def test_an_earlier_runs_picture_goes_with_its_slices(scan, tmp_path):
     arguments = ("reconstruct", scan.counts, "--center", 45, "--out", tmp_path / "out")
     assert run(*arguments, "--method", "sirt", "--steps", 2) == 0

@@ -74,6 +74,7 @@ def test_every_method_finds_the_slice(half, tmp_path, options):
         assert volume.min() >= 0
 
 
+@pytest.mark.full
 def test_an_unfiltered_backprojection_has_no_unit(half, tmp_path, capsys):
     path, _ = half
     options = ("--center", 35.5, "--unit", "mm", "--format", "h5", "--method", "backproject")
@@ -88,6 +89,7 @@ def test_an_unfiltered_backprojection_has_no_unit(half, tmp_path, capsys):
     np.testing.assert_allclose(*found, rtol=1e-5)
 
 
+@pytest.mark.full
 def test_steps_end_where_noise_is_left(half, tmp_path):
     path, _ = half
     common = ("--center", 35.5, "--method", "cgls", "--steps", 30)
@@ -166,6 +168,7 @@ def test_views_of_an_offset_axis_stand_for_their_own_side(tmp_path, angles):
     np.testing.assert_allclose(volume[0], image, atol=1e-4 * image.max())
 
 
+@pytest.mark.full
 @pytest.mark.parametrize(
     ("method", "missing", "wide", "said"),
     [
@@ -212,6 +215,7 @@ def test_slices_of_an_offset_axis_reach_to_the_farther_end(tmp_path, beyond):
     assert ("beyond that end as well" in said) == beyond
 
 
+@pytest.mark.full
 def test_an_object_wider_than_the_detector_is_continued(tmp_path):
     path, bins = tmp_path / "scan.npz", 40
     truth = save_phantom(path, HALF, bins, size=80)[20:60, 20:60]
@@ -231,6 +235,7 @@ def test_an_object_wider_than_the_detector_is_continued(tmp_path):
     assert abs((explained[0] - truth)[border].mean()) < 0.3 * bias[1]
 
 
+@pytest.mark.full
 def test_the_axis_is_that_of_the_rows_that_are_wanted_beside_air(tmp_path):
     path, stack = tmp_path / "scan.npz", np.zeros((VIEWS, 40, 72))
     for first, center in ((1, 35.5), (30, 38.0)):
@@ -245,6 +250,7 @@ def test_the_axis_is_that_of_the_rows_that_are_wanted_beside_air(tmp_path):
     assert metrics["center"] == pytest.approx(38.0, abs=0.5)
 
 
+@pytest.mark.full
 def test_the_background_is_brought_to_zero(tmp_path):
     path = tmp_path / "scan.npz"
     truth = save_phantom(path, HALF, 80, offset=0.7)

@@ -56,6 +56,7 @@ def test_a_run_that_was_cut_off_goes_on_to_the_same_bits(
     assert not (tmp_path / "cut/slabs").exists()
 
 
+@pytest.mark.full
 def test_what_belongs_to_another_run_is_not_gone_on_with(scan, tmp_path, monkeypatch, capsys):
     arguments = ("reconstruct", scan.counts, "--center", 45, "--out", tmp_path / "out")
     with monkeypatch.context() as patch:
@@ -126,6 +127,7 @@ def test_a_preview_is_a_picture_of_the_middle_slice(scan, tmp_path):
     assert run("reconstruct", scan.counts, "--center", 45, "--out", out) == 0
 
 
+@pytest.mark.full
 def test_a_long_run_shows_a_slice_first(scan, tmp_path):
     out = tmp_path / "out"
     assert run("reconstruct", scan.counts, "--center", 45, "--out", out, *STEPS) == 0
@@ -135,6 +137,7 @@ def test_a_long_run_shows_a_slice_first(scan, tmp_path):
     assert "data:image/jpeg" in (out / "report.html").read_text()
 
 
+@pytest.mark.full
 def test_an_earlier_run_is_kept_unless_told(scan, tmp_path, capsys):
     arguments = ("reconstruct", scan.counts, "--center", 45, "--out", tmp_path / "out")
     assert run(*arguments) == 0
@@ -150,6 +153,7 @@ def test_other_peoples_files_are_kept(scan, tmp_path, capsys):
     assert [p.name for p in tmp_path.iterdir()] == ["thesis.tex"]
 
 
+@pytest.mark.full
 def test_a_run_cut_off_in_its_report_can_be_repeated(scan, tmp_path, monkeypatch):
     def interrupt(*_):
         raise KeyboardInterrupt
@@ -162,6 +166,7 @@ def test_a_run_cut_off_in_its_report_can_be_repeated(scan, tmp_path, monkeypatch
     assert run(*arguments, "--overwrite") == 0
 
 
+@pytest.mark.full
 def test_a_failed_overwrite_loses_nothing(scan, tmp_path):
     out = tmp_path / "out"
     assert run("reconstruct", scan.counts, "--center", 45, "--out", out) == 0

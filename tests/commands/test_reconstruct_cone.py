@@ -47,6 +47,7 @@ def ball(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return path
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("center", [(CENTER, 9.5), (9.5, CENTER)])
 def test_a_row_and_a_bin_in_another_order_are_doubted(
     ball: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], center: tuple[float, float]
@@ -215,6 +216,7 @@ def test_an_object_longer_than_the_detector_is_told(tmp_path: Path, method: str)
         assert levels.max() < 1.25 * 0.02 and levels[-1] == pytest.approx(0.02, rel=0.02)
 
 
+@pytest.mark.full
 def test_an_object_beyond_one_end_alone_is_told_of_that_end(tmp_path: Path) -> None:
     angles = 2 * np.pi * np.arange(24) / 24
     part = [Ellipsoid((10, 0, 0), (12.0, 9.0, 9.0), 0.0, 0.02)]
@@ -228,6 +230,7 @@ def test_an_object_beyond_one_end_alone_is_told_of_that_end(tmp_path: Path) -> N
     assert "lower" not in note
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("last", [1.0, 3.0])
 def test_air_that_is_off_zero_is_no_object_that_goes_on(
     ball: Path, tmp_path: Path, last: float
@@ -297,6 +300,7 @@ def test_steps_on_a_volume_larger_than_the_memory_are_done_in_parts(
     assert np.abs(found - wanted).max() <= 1e-4 * np.abs(wanted).max()
 
 
+@pytest.mark.full
 def test_a_preview_and_a_plan(
     ball: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

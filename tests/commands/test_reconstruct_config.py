@@ -75,6 +75,7 @@ def in_millimetres(scan, tmp_path_factory):
     return out
 
 
+@pytest.mark.full
 @pytest.mark.parametrize(
     ("options", "voxel", "width", "value"),
     [
@@ -112,6 +113,7 @@ def test_another_method_has_no_filter_left_over(in_millimetres, tmp_path, capsys
     assert run("reconstruct", *config, "--method", "cgls", "--out", fbp) == 0
 
 
+@pytest.mark.full
 def test_in_python_too_and_of_a_file_that_was_edited(in_millimetres, scan, tmp_path):
     given = {"config": in_millimetres / "config.json", "progress": False}
     found = rift.reconstruct_scan(scan.integrals, tmp_path / "out", binning=2, **given)
@@ -140,6 +142,7 @@ def test_what_changes_a_run_is_told_from_where_it_is_left(words, changes):
     assert changes_a_run(words.split()) == changes
 
 
+@pytest.mark.full
 def test_steps_are_recorded(scan, tmp_path):
     out = tmp_path / "out"
     options = ("--method", "cgls", "--precondition", "ramp", "--center", 45)
@@ -180,6 +183,7 @@ def test_a_configuration_that_is_not_there_is_told(tmp_path, capsys):
     assert "none.json" in capsys.readouterr().err
 
 
+@pytest.mark.full
 def test_integers_record_the_window_that_was_chosen(first, scan, tmp_path):
     out = tmp_path / "out"
     options = ("--dtype", "uint16", "--format", "h5", "--center", 45)

@@ -48,6 +48,7 @@ def notes(out):
 PHASE = ("--delta-beta", 200, "--energy", 20, "--propagation", 50, "--pitch", 3, "--unit", "um")
 
 
+@pytest.mark.full
 def test_phase_retrieval_blurs_as_its_formula_says_and_keeps_the_level(tmp_path):
     # Weak, so that the logarithm of what is blurred is what is blurred of the logarithm.
     path = write_counts(tmp_path / "scan.h5", line_integrals(value=0.002))
@@ -58,6 +59,7 @@ def test_phase_retrieval_blurs_as_its_formula_says_and_keeps_the_level(tmp_path)
     assert 3 * phase.sum() == pytest.approx(plain.sum(), rel=0.01)
 
 
+@pytest.mark.full
 def test_slabs_do_not_show(tmp_path, monkeypatch):
     path = write_counts(tmp_path / "scan.h5", line_integrals())
     options = ("--center", 39.5, "--rings", "off", *PHASE)
@@ -122,6 +124,7 @@ def test_binning_of_an_odd_detector_says_what_it_leaves_out(tmp_path):
     assert "the last 1 row and the last 1 bin" in notes(tmp_path / "out")
 
 
+@pytest.mark.full
 def test_rows_that_no_blocks_are_made_of_are_told(tmp_path):
     path = write_counts(tmp_path / "scan.h5", line_integrals())
     common = ("--center", 39.5, "--pitch", 0.5, "--unit", "mm", "--rings", "off", "--binning", 2)
@@ -168,6 +171,7 @@ def tilted_counts(path, degrees):
     return write_counts(path, np.stack(rows, axis=1))
 
 
+@pytest.mark.full
 def test_a_tilted_axis_is_made_upright(tmp_path):
     straight = tilted_counts(tmp_path / "straight.h5", 0.0)
     leaning = tilted_counts(tmp_path / "leaning.h5", 4.0)
@@ -202,6 +206,7 @@ def test_a_tilt_that_the_rows_contradict_is_doubted(tmp_path):
     }
 
 
+@pytest.mark.full
 def test_the_center_command_names_the_tilt_that_its_bin_leaves_out(tmp_path, capsys):
     for degrees in (4.0, 0.0):
         path = tilted_counts(tmp_path / f"{degrees:g}.h5", degrees)
@@ -223,6 +228,7 @@ def half_acquisition(tmp_path_factory):
     return path, 0.2 * rift.phantom.shepp_logan(grid)
 
 
+@pytest.mark.full
 @pytest.mark.parametrize(
     "options", [(), ("--method", "cgls", "--steps", 12), ("--method", "sirt", "--subsets", 10)]
 )
@@ -271,6 +277,7 @@ def test_zingers_are_removed_and_counted_in_slabs_of_any_size(tmp_path, monkeypa
     assert "Zingers" in notes(tmp_path / "mended")
 
 
+@pytest.mark.full
 def test_the_axis_is_searched_in_rows_without_zingers(tmp_path):
     integrals = line_integrals()
     hits = np.random.default_rng(5).random(integrals.shape) < 1e-3
@@ -292,6 +299,7 @@ def test_a_scan_of_one_row_is_binned_along_its_bins(tmp_path):
     assert "Blocks of 1 x 2" in notes(tmp_path / "out")
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("height", [1, 2])
 def test_a_tilt_is_found_with_the_axis_and_turned(tmp_path, height):
     """An angle, of rows of any height."""
@@ -329,6 +337,7 @@ def test_a_tilt_that_is_not_turned_is_not_announced(tmp_path, capsys):
     reconstruct(path, tmp_path / "left", "--rings", "off", "--tilt", 0)
 
 
+@pytest.mark.full
 def test_each_row_may_have_an_axis_of_its_own(tmp_path):
     chance = np.random.default_rng(3)
     centers = 39.5 + chance.integers(-3, 4, ROWS)

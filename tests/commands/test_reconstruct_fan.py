@@ -71,6 +71,7 @@ def test_axis_and_sense_of_a_fan_are_the_datas(tmp_path: Path, span: str) -> Non
     np.testing.assert_array_equal(read_volume(tmp_path / "again" / "slices")[0], image)
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("center", [48.6, 110.4])
 def test_a_fan_displaced_by_a_third_reaches_to_the_farther_end(
     tmp_path: Path, center: float
@@ -129,6 +130,7 @@ def test_data_without_contrast_leave_the_axis_to_the_file(tmp_path: Path) -> Non
     assert "The axis was taken to be that of the file, bin 75.00" in said
 
 
+@pytest.mark.full
 def test_lengths_in_two_units_are_doubted(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -197,6 +197,7 @@ def test_the_folder_of_a_fit_brings_its_drawing_and_background_along(scene, tmp_
     assert not (tmp_path / "none").exists()
 
 
+@pytest.mark.full
 def test_what_an_earlier_rendering_left_is_gone_after_another(scene, tmp_path, capsys):
     assert render(scene, tmp_path / "film", *small("--depth")) == 0
     assert render(scene, tmp_path / "film", *small()) == 5

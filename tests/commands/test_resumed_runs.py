@@ -93,6 +93,7 @@ def killed(monkeypatch, number, do):
     return False
 
 
+@pytest.mark.full
 def test_a_run_that_was_cut_off_at_any_write_ends_with_the_same_bytes(
     words, tmp_path, monkeypatch, capsys
 ):

@@ -170,12 +170,14 @@ def test_an_object_that_reaches_into_what_is_taken_for_air_is_told(lines, tmp_pa
     )
 
 
+@pytest.mark.full
 def test_the_remedy_that_is_named_ends_the_doubt(lines, tmp_path, capsys):
     weaker = frames(lines, 0.7 * BEAM)
     assert "--background 5 brings it to zero" in said(tmp_path, capsys, weaker)
     assert "Doubt" not in said(tmp_path, capsys, weaker, "--background", "5", "--overwrite")
 
 
+@pytest.mark.full
 def test_air_that_is_off_zero_is_no_object_that_goes_on(lines, tmp_path, capsys):
     fallen = frames(lines, BEAM * (1 - 0.4 * FALL))
     assert "wider than the detector" not in said(tmp_path, capsys, fallen)
@@ -226,6 +228,7 @@ def test_flats_of_two_levels_at_one_time_are_said_to_be_of_one(lines, tmp_path, 
     assert "the flats read two levels" in told and "at one time" in told
 
 
+@pytest.mark.full
 def test_an_axis_that_is_not_found_for_that_is_told_with_it(lines, tmp_path, capsys):
     made = _sample_in_flats(lines)
     with h5py.File(tmp_path / "scan.h5", "w") as file:
@@ -236,6 +239,7 @@ def test_an_axis_that_is_not_found_for_that_is_told_with_it(lines, tmp_path, cap
     assert "brighter than the open beam" in capsys.readouterr().err
 
 
+@pytest.mark.full
 def test_a_fit_of_xrays_says_what_was_found(lines, tmp_path, capsys):
     made = frames(lines, 1.6 * BEAM)
     with h5py.File(tmp_path / "scan.h5", "w") as file:

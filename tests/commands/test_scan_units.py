@@ -114,6 +114,7 @@ def test_lengths_that_do_not_fit_a_file_with_a_unit_are_refused(
     assert word in capsys.readouterr().err and not (tmp_path / "out").exists()
 
 
+@pytest.mark.full
 def test_a_unit_without_a_length_is_refused(
     bare: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -126,6 +127,7 @@ def test_a_unit_without_a_length_is_refused(
     assert settings_of(tmp_path / "out")["unit"] == "um"
 
 
+@pytest.mark.full
 def test_a_pitch_without_a_unit_is_said_to_have_none(
     bare: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -238,6 +240,7 @@ def test_the_plan_names_the_height_of_voxels(
     assert "0.3 x 0.1 x 0.1 mm (z, y, x)" in " ".join(capsys.readouterr().out.split())
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("format", ["tiff", "tiff-stack", "zarr", "mrc"])
 @pytest.mark.each
 def test_every_format_has_the_height_of_slices(high: Path, tmp_path: Path, format: str) -> None:
@@ -260,6 +263,7 @@ def test_every_format_has_the_height_of_slices(high: Path, tmp_path: Path, forma
             assert length / count == pytest.approx(0.1)
 
 
+@pytest.mark.full
 def test_phase_is_retrieved_of_pixels_as_high_as_they_are(high: Path, tmp_path: Path) -> None:
     """Rows that are farther apart show less of the fringes, so that other values come out."""
     phase = ("--delta-beta", 500, "--energy", 20, "--propagation", 2e5)
@@ -274,6 +278,7 @@ def test_phase_is_retrieved_of_pixels_as_high_as_they_are(high: Path, tmp_path: 
     assert steepness[0] > 1.05 * steepness[1]
 
 
+@pytest.mark.full
 def test_phase_retrieval_in_another_unit_is_doubted(high: Path, tmp_path: Path) -> None:
     phase = ("--delta-beta", 500, "--propagation", 2e5)
     for name, energy in (("keV", 20), ("eV", 20000)):
@@ -287,6 +292,7 @@ def heights(out: Path) -> tuple[float, ...]:
     return read_volume_place(out / "volume.h5").spacing
 
 
+@pytest.mark.full
 @pytest.mark.parametrize(
     ("scan", "options", "spacing"),
     [

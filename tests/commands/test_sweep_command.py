@@ -133,6 +133,7 @@ def test_a_sweep_goes_on_and_each_run_is_what_the_command_makes(scans, tmp_path)
     assert figures["method=cgls_size=8"]["mean"] == float(rows[1]["mean"])
 
 
+@pytest.mark.full
 @pytest.mark.once
 def test_a_run_that_cannot_be_done_is_told_beside_the_others(scans, tmp_path, capsys):
     words = ("--fixed", "kind=attenuation", "center=7.5", "--vary", "rows=0 1,0 9")
@@ -158,6 +159,7 @@ def test_the_second_try_of_a_run_goes_on_with_the_first(scans, tmp_path):
     assert one_run(each.job, each.settings) == "" and is_done(each.settings.out)
 
 
+@pytest.mark.full
 @pytest.mark.once
 def test_a_run_of_an_older_sweep_with_other_settings_is_not_done(scans, tmp_path):
     out = tmp_path / "out"
@@ -168,6 +170,7 @@ def test_a_run_of_an_older_sweep_with_other_settings_is_not_done(scans, tmp_path
         done(other)
 
 
+@pytest.mark.full
 @pytest.mark.once
 def test_a_run_of_an_input_that_was_changed_since_is_not_mixed_with_others(tmp_path):
     scan, out = save_scan(tmp_path / "a.npz", 0), tmp_path / "out"

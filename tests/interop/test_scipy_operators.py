@@ -40,6 +40,7 @@ def test_shape_type_and_values_are_the_operators(A):
     assert (S @ x.ravel()).dtype == A.dtype
 
 
+@pytest.mark.full
 def test_adjoint_and_transpose_are_the_transposed_matrix(A):
     S = aslinearoperator(A)
     matrix, near = S @ np.eye(72, dtype=A.dtype), SMALLEST[A.dtype.name]

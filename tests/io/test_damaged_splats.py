@@ -110,6 +110,7 @@ print(fuzz(Path(sys.argv[3]), sys.argv[4]))
 """
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("kind", KINDS)
 def test_damaged_files(tmp_path: Path, kind: str) -> None:
     """In a process of its own, so that a crash is a failure and not the end of the tests."""

@@ -62,6 +62,7 @@ def test_the_child_gives_the_pixels_and_the_header_that_are_decoded_here(picture
     assert read_picture.read_picture_header(picture) == decode_header(picture, "png")
 
 
+@pytest.mark.full
 @pytest.mark.skipif(sys.platform == "win32", reason="nothing is killed by a signal on Windows")
 @pytest.mark.parametrize(
     ("fate", "kind", "says"),
@@ -113,6 +114,7 @@ def test_what_a_batch_system_sends_to_all_processes_costs_no_file(fated, picture
     assert read_image(picture).shape == (4, 5, 3)
 
 
+@pytest.mark.full
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="there is no fork here")
 def test_a_forked_process_has_a_decoder_of_its_own(python, picture):
     done = python(
@@ -131,6 +133,7 @@ def test_a_forked_process_has_a_decoder_of_its_own(python, picture):
     assert (done.returncode, done.stderr) == (0, "")
 
 
+@pytest.mark.full
 def test_a_process_that_ends_takes_its_decoder_along(python, picture):
     done = python(
         "from rift_cl.io import read_image\n"

@@ -115,6 +115,7 @@ def test_a_light_comes_back_from_its_picture(tmp_path, display):
     assert np.abs(again - given).max() < 0.01 * given.max()
 
 
+@pytest.mark.full
 def test_up_is_at_the_top_x_in_the_middle_and_y_left_of_it(tmp_path):
     picture = np.zeros((32, 64, 3), np.float32)
     picture[:4, :, 0] = 1
@@ -130,11 +131,13 @@ def test_up_is_at_the_top_x_in_the_middle_and_y_left_of_it(tmp_path):
     assert again[64, 128, 1] == again[..., 1].max() or again[64, 128, 1] > again[64, 64, 1]
 
 
+@pytest.mark.full
 def test_what_its_lobes_would_ripple_over_is_a_denser_light(tmp_path):
     write_png(tmp_path / "a.png", np.full((32, 64, 3), 0.5))
     assert len(read_environment_map(tmp_path / "a.png", 32, display=True)) == 128
 
 
+@pytest.mark.full
 def test_a_small_lamp_does_not_fall_between_pixels(tmp_path):
     picture = np.zeros((256, 512, 3), np.float32)
     picture[131, 77] = 1
@@ -143,6 +146,7 @@ def test_a_small_lamp_does_not_fall_between_pixels(tmp_path):
     assert np.exp(found).max() > 1e-4
 
 
+@pytest.mark.full
 def test_a_dark_picture_is_a_dark_light_of_finite_numbers(tmp_path):
     write_png(tmp_path / "a.png", np.zeros((8, 16, 3)))
     found = read_environment_map(tmp_path / "a.png", 16, display=True)
@@ -160,6 +164,7 @@ def test_pictures_of_another_shape_are_refused(tmp_path):
         read_environment_map(tmp_path / "none.png", 16, display=True)
 
 
+@pytest.mark.full
 def test_negative_light_is_refused_but_for_what_filters_leave(tmp_path):
     for level, refused in ((-1.0, True), (-0.02, True), (-0.001, False)):
         light = np.full((8, 16, 3), level, np.float32)
@@ -198,12 +203,14 @@ def relit(tmp_path, picture, log_sharpness, lobes=128):
     return reflected_light(lit.normals, lit.reflectance, lit.environment, directions_of(4000))[0]
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("log_sharpness", [3.4, 9.0])
 def test_a_constant_picture_is_constant_light(tmp_path, log_sharpness):
     shown = relit(tmp_path, np.full((32, 64, 3), 0.6), log_sharpness)
     np.testing.assert_allclose(shown, 0.6, rtol=0.02)
 
 
+@pytest.mark.full
 def test_a_soft_sky_beside_a_sharp_sun_is_soft(tmp_path):
     """Ripples of the lattice were 10 % of the sky, and the sun lost or won up to half its light."""
     picture = np.broadcast_to(np.linspace(0.5, 0.3, 64)[:, None, None], (64, 128, 3)).copy()
@@ -220,6 +227,7 @@ def test_a_soft_sky_beside_a_sharp_sun_is_soft(tmp_path):
     assert shown.mean() == pytest.approx(mean, rel=0.02)
 
 
+@pytest.mark.full
 def test_small_lamps_keep_their_light():
     """By least squares, a lamp far smaller than a lobe had up to twice of it."""
     ways, count = directions_of(3000, 7), 256
@@ -232,6 +240,7 @@ def test_small_lamps_keep_their_light():
         np.testing.assert_allclose(shown.mean(0), lamp.mean(0), rtol=1e-3)
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("display", [True, False])
 @pytest.mark.parametrize("rows", [64, 150])
 @pytest.mark.parametrize("place", [[0.6, 0.3, 0.74], [0.0, 0.0, 1.0]])

@@ -193,6 +193,7 @@ def test_colmap_models_that_are_damaged_at_random(
     assert 10 < sum(opened) < len(opened) - 10
 
 
+@pytest.mark.full
 def test_point_clouds_that_are_damaged_at_random(tmp_path: Path) -> None:
     made.transforms(tmp_path, ply_file_path="points.ply")
     random = np.random.default_rng(12)
@@ -230,6 +231,7 @@ def mutated(value: Any, random: np.random.Generator) -> Any:
     return value
 
 
+@pytest.mark.full
 def test_json_captures_that_are_changed_at_random(tmp_path: Path) -> None:
     """Half of them by meaning, half of them by bytes."""
     extra = {"k1": 0.01, "k2": 0.0, "p1": 0.001, "camera_angle_x": 0.6, "aabb_scale": 4}

@@ -210,6 +210,7 @@ def fuzz(folder: Path) -> str:
     return json.dumps(tally)
 
 
+@pytest.mark.full
 def test_damaged_files(tmp_path: Path) -> None:
     """In a process of its own, so that a crash is a failure and not the end of the tests."""
     here = Path(__file__)

@@ -101,6 +101,7 @@ def random_views(random: np.random.Generator, shift: float, radius: float) -> np
     return total * 10 ** random.uniform(-2, 0.9)
 
 
+@pytest.mark.full
 def test_attenuation_and_transmission_are_never_taken_for_one_another() -> None:
     random = np.random.default_rng(0)
     for _ in range(500):

@@ -41,6 +41,7 @@ def test_a_registered_reader_is_asked(raw):
     assert rift.open_scan(raw, kind="transmission").kind == "transmission"
 
 
+@pytest.mark.full
 def test_the_commands_know_readers_and_filters_by_their_names(raw, tmp_path):
     rift.register_filter("mine", lambda f: f * np.exp(-f))
     np.savez(tmp_path / "same.npz", projections=VALUES, angles=ANGLES, pitch=0.5)

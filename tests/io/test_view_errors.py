@@ -21,6 +21,7 @@ from rift_cl.geometry.lens_distortion import Lens
 from rift_cl.io import View, camera_at, read_view, write_png
 
 
+@pytest.mark.full
 def test_budget(tmp_path: Path) -> None:
     """Nothing is decoded that does not fit, and what fits takes no more than was said."""
     size = (600, 800)

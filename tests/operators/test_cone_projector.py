@@ -56,6 +56,7 @@ def scan(request):
     return grid, scan, footprint, ConeProjector(grid, scan, footprint)
 
 
+@pytest.mark.full
 def test_the_pair_equals_its_twin_and_is_matched(device, scan):
     grid, scan, footprint, twin = scan
     A = Projector(grid, scan, footprint, device=device)
@@ -82,6 +83,7 @@ def changed(scan, **changes):
     return Cone(**{name: getattr(scan, name) for name in names} | changes)
 
 
+@pytest.mark.full
 def test_the_adjoint_is_exact_and_bits_repeat(device):
     A = Projector(Grid((37, 40, 45)), covering(44), device=device)
     random = np.random.default_rng(2)
@@ -166,6 +168,7 @@ def test_raising_source_and_volume_together_changes_nothing(device):
     assert relative(B(x), A(x)) <= ROUNDING
 
 
+@pytest.mark.full
 def test_a_source_far_away_sees_parallel_rays(device):
     """On a volume that is the same in every slice, so that the stretch changes nothing."""
     n, views = 32, 12
@@ -196,6 +199,7 @@ def test_what_cannot_be_projected_is_refused(device, grid, scan, about):
         Projector(grid, scan, device=device)
 
 
+@pytest.mark.full
 def test_runs_of_any_length_give_the_same_bits(device, monkeypatch):
     A = Projector(Grid((9, 10, 11)), covering(11), device=device)
     random = np.random.default_rng(10)

@@ -89,6 +89,7 @@ def test_strips_wider_than_the_image_equal_the_matrix(device, bins):
     assert relative(A.T(y), matrix.backproject(y)) <= ROUNDING
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("curved", [False, True])
 def test_weights_of_the_inverse_square_equal_the_matrix(device, curved):
     grid, scan = Grid((33, 31)), Fan(TURN, 49, 1.4, 60.0, 90.0, curved=curved)

@@ -34,6 +34,7 @@ def test_the_pair_is_matched_and_slices_are_their_own(device, curved, power):
     assert not np.delete(A(lone), 4, axis=1).any()
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("curved", [False, True])
 def test_it_sees_what_a_cone_s_middle_row_and_the_fan_of_one_slice_see(device, curved):
     scan = fan(curved=curved)

@@ -243,6 +243,7 @@ def geometries(draw):
     return Grid(shape, spacing, center), Parallel(angles, bins, draw(length), axis)
 
 
+@pytest.mark.full
 @settings(max_examples=15, deadline=None, suppress_health_check=list(HealthCheck))
 @given(geometries())
 def test_any_scan_is_matched_and_near_its_twin(device, drawn):

@@ -291,6 +291,7 @@ def test_a_response_may_change_the_frequencies_that_it_is_given():
     assert response.taps(BINS, 1.0).tobytes() == aside.taps(BINS, 1.0).tobytes()
 
 
+@pytest.mark.full
 def test_a_cone_doubts_responses_as_parallel_beams_do(device):
     scan = Fan(np.linspace(0, 2 * np.pi, 8, endpoint=False), 13, 0.01, 2, 4)
     A = Projector(Grid((8, 8), 0.01), scan, device=device)

@@ -139,6 +139,7 @@ def geometries(draw):
     return Grid(shape, spacing, center), scan, draw(st.sampled_from(FOOTPRINTS))
 
 
+@pytest.mark.full
 @settings(
     max_examples=150, derandomize=True, deadline=None, suppress_health_check=list(HealthCheck)
 )

@@ -119,6 +119,7 @@ def test_two_runs_give_the_same_bits(device):
     assert digest(device) == digest(device)
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("threads", [1, 2])
 def test_another_process_gives_the_same_bits(device, threads):
     """Whatever its number of threads, which PoCL lets us choose."""

@@ -52,6 +52,7 @@ def test_an_image_larger_than_the_largest_array_is_backprojected_in_bands(device
     assert_same(back(A), back(whole))
 
 
+@pytest.mark.full
 def test_what_is_cut_both_ways_is_added_up_to_rounding(device):
     """Neither the image nor the sinogram is as small as the largest array."""
     small = limited(device, allocation=120_000)

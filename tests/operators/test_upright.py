@@ -84,6 +84,7 @@ def reading(device, scan, found, *, spline=False):
     return Rectification(device, tilted, upright, found.views, found.forms, dtype, spline=spline)
 
 
+@pytest.mark.full
 @pytest.mark.each
 @pytest.mark.parametrize("spline", [False, True])
 def test_reading_and_its_transpose_equal_the_matrices(device, case, spline):

@@ -70,6 +70,7 @@ def test_runs_of_views_and_slabs_of_slices_have_the_same_bits(device, scan, dtyp
     assert_same(both(A), both(whole))
 
 
+@pytest.mark.full
 def test_what_is_cut_both_ways_is_added_up_to_rounding(device):
     """Neither the padded volume nor the projections are as small as the largest array."""
     small = limited(device, allocation=40_000)
@@ -112,6 +113,7 @@ def test_fdk_filters_runs_of_views_and_backprojects_slabs(device, scan):
     assert len(list(small._weighting._chunks(few))) >= 2
 
 
+@pytest.mark.full
 def test_sums_products_and_multiples_are_taken_step_by_step(device):
     """Where the device holds no two results at a time."""
 

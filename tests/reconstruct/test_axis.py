@@ -159,6 +159,7 @@ def test_bins_that_sample_instead_of_averaging_do_not_pull_to_half_a_bin(center)
     assert off < 0.1 or found.interval[0] < center < found.interval[1]
 
 
+@pytest.mark.full
 def test_of_noisy_half_turns_the_centre_of_mass_is_part_of_the_answer():
     off = []
     for seed in range(6):
@@ -185,6 +186,7 @@ def test_limited_angles_over_sloping_air_are_refused():
         rift.find_center(y + air, HALF[:120])
 
 
+@pytest.mark.full
 def test_nothing_but_the_detector_changes_the_answer():
     y = sinogram(KINDS["porous"], HALF, 83.7)
     order = np.random.default_rng(1).permutation(HALF.size)
@@ -218,6 +220,7 @@ def _beside_air(slope, first, stop, rows=40):
     return stack
 
 
+@pytest.mark.full
 @pytest.mark.parametrize(("first", "stop"), [(1, 11), (14, 27)])
 @pytest.mark.parametrize("slope", [0.0, 0.2])
 def test_rows_of_air_have_no_vote(first, stop, slope):
@@ -253,6 +256,7 @@ def test_rows_that_contradict_each_other_are_refused():
         rift.find_center(stack, HALF)
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("noise", [0.03, 0.05])
 def test_the_interval_holds_the_axis_and_grows_with_noise(noise):
     quiet = rift.find_center(sinogram(PARTS, HALF, 83.7, noise=0.005), HALF)
@@ -264,6 +268,7 @@ def test_the_interval_holds_the_axis_and_grows_with_noise(noise):
     assert np.median(wide) > 1.5 * (quiet.interval[1] - quiet.interval[0])
 
 
+@pytest.mark.full
 def test_an_axis_that_moves_during_a_turn_widens_the_interval():
     still = rift.find_center(sinogram(PARTS, FULL, 83.7), FULL)
     # It drifts by a bin during the first half turn, and stays there.

@@ -12,6 +12,7 @@ from rift_cl.phantom import project
 from rift_cl.reconstruct.calibration import turned
 
 
+@pytest.mark.full
 def test_centre_sense_and_roll_of_a_cone():
     true = cone(rows=40, center=(19.5, 83.7))
     vectors = turned(true, np.deg2rad(0.8))
@@ -27,6 +28,7 @@ def test_centre_sense_and_roll_of_a_cone():
     assert found.disagreement[1] < found.disagreement[0]
 
 
+@pytest.mark.full
 def test_a_detector_slanted_about_its_columns():
     taken = cone(rows=24, center=(11.5, 79.5))
     vectors = turned(replace(taken, center=(11.5, 79.8)), np.deg2rad(-0.3), np.deg2rad(2.5))
@@ -93,6 +95,7 @@ def test_a_rolled_detector_shows_the_axis_along_a_slope():
 FAULTS = [(0.0, 1.0, 0.0), (0.4, -1.5, 0.6), (0.0, 0.0, 0.0)]
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("fault", FAULTS)
 def test_planes_tell_the_row_of_the_orbit(fault):
     center, row, roll = fault

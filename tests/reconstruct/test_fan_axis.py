@@ -45,6 +45,7 @@ def test_parts_of_views_tell_the_axis_of_a_noisy_short_scan():
     assert found.interval[0] < 83.7 < found.interval[1]
 
 
+@pytest.mark.full
 def test_the_sense_is_told():
     scan = fan()
     y = sinogram(KINDS["porous"], scan)
@@ -80,6 +81,7 @@ def test_a_curved_detector():
     assert rift.find_center(y, _unknown(scan)).center == pytest.approx(83.7, abs=0.1)
 
 
+@pytest.mark.full
 def test_cones_are_searched_near_the_orbit():
     scan = cone()
     y = projections(scan)
@@ -140,6 +142,7 @@ def test_thin_layers_beside_the_orbit_are_no_rows_taken_for_bins(heights):
     assert not swapped(project(parts, rift.Grid((4, 4, 4)), scan), scan)[0]
 
 
+@pytest.mark.full
 def test_a_search_that_leads_off_the_detector_comes_back():
     """Beyond its ends windows are empty, of which nothing can be told."""
     scan = wide_cone()
@@ -148,6 +151,7 @@ def test_a_search_that_leads_off_the_detector_comes_back():
     assert 0 <= rift.find_center(np.ascontiguousarray(y), scan).center <= 39
 
 
+@pytest.mark.full
 def test_a_pitch_in_another_unit_is_doubted():
     scan = fan()
     y = sinogram(KINDS["porous"], scan)

@@ -76,6 +76,7 @@ def test_a_fan_has_an_adjoint_and_a_sentence(device):
     assert "Wang" in repr(F)
 
 
+@pytest.mark.full
 def test_backprojection_alone_has_the_unit_of_a_parallel_one(device):
     far, near = fan(distance=20.0), [phantom.Ellipsoid.ball(0.2 * N)]
     parallel = rift.Parallel(FULL, far.bins, far.pitch / far.magnification)

@@ -127,6 +127,7 @@ def psnr(image, truth, where):
     return -10 * np.log10(np.mean((image - truth)[where] ** 2))
 
 
+@pytest.mark.full
 def test_phases_cost_next_to_nothing(device):
     """Against the exact transform's transpose, from the head's exact line integrals."""
     grid, scan = Grid((128, 128)), Parallel(np.linspace(0, np.pi, 192, endpoint=False), bins=182)

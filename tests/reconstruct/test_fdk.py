@@ -203,6 +203,7 @@ def test_an_object_that_fills_the_longer_side_has_its_rim(device, off):
     assert rim(device, cut, parts) < 1.2 * best + 2e-3
 
 
+@pytest.mark.full
 def test_backprojection_alone_has_the_unit_of_a_parallel_one(device):
     scan = circle(distance=20.0)
     parallel = rift.Parallel(FULL, scan.bins, scan.pitch[1] / scan.magnification)

@@ -73,6 +73,7 @@ def test_a_whole_ball_has_its_density(device, case):
     assert level(device, helix(**CASES[case])) == pytest.approx(1, abs=1e-3)
 
 
+@pytest.mark.full
 def test_no_density_is_lost_that_a_circle_loses(device):
     scan = helix(distance=1.35)
     circle = replace(scan, angles=np.arange(72) * 2 * np.pi / 72, heights=np.zeros(72))
@@ -102,6 +103,7 @@ def test_vectors_of_a_helix_are_reconstructed_as_their_cone(device):
         FDK(Projector(GRID, scan.vectors(), device=device))
 
 
+@pytest.mark.full
 def test_the_head_is_as_sharp_as_from_a_circle(device):
     scan = helix(per_turn=90)
     circle = replace(scan, angles=np.arange(90) * 2 * np.pi / 90, heights=np.zeros(90))

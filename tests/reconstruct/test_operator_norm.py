@@ -14,6 +14,7 @@ def matrix_of(A):
     return np.array([A(unit.reshape(A.domain)).ravel() for unit in units]).T.astype(float)
 
 
+@pytest.mark.full
 def test_it_bounds_the_largest_singular_value_closely(device):
     grid = rift.Grid((9, 11), spacing=0.4)
     A = rift.Projector(grid, rift.Parallel(np.arange(7) / 7 * np.pi, 15, 0.5), device=device)

@@ -34,6 +34,7 @@ def test_a_ramp_saves_most_steps(device, method, share, saved):
     assert steps_to(precondition="ramp") * saved <= steps_to()
 
 
+@pytest.mark.full
 def test_the_largest_eigenvalue_is_found_from_above(device):
     A, matrix, _, y = problem(device)
     for precondition in (None, "ramp"):

@@ -128,6 +128,7 @@ def by_hand(sinogram, window):
     return twin.unranked(twin.median_across(ranked, window), order)
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("kind", ["full", "varying", "wide", "dead", "fluctuating"])
 def test_it_equals_its_steps_to_the_bit_on_every_device(device, noisy, kind):
     bad, _ = striped(noisy, kind)

@@ -71,6 +71,7 @@ def objective(A, y, weight, image, F=None):
     return square / 2 + weight * twin.total_variation(image, A.grid.spacing)
 
 
+@pytest.mark.full
 @pytest.mark.parametrize(
     ("precondition", "nonnegative", "weight"),
     [(None, False, 0.2), (None, True, 0.02), ("ramp", True, 0.2), ("ramp", False, 0.02)],
@@ -92,6 +93,7 @@ def test_fista_and_pdhg_reach_the_same_minimum(device, weight, nonnegative, prec
             assert objective(A, y, weight, aside, F) > value
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("precondition", [None, "ramp"])
 @pytest.mark.parametrize("factor", [100, 1000])
 def test_pdhg_is_near_the_minimum_whatever_the_weight(device, factor, precondition):
@@ -116,6 +118,7 @@ def test_steps_of_pdhg_converge_whatever_the_weight(device, precondition):
     assert taus[0] == taus[1] == taus[2] > taus[3] > taus[4] > 0
 
 
+@pytest.mark.full
 def test_total_variation_bounds_the_gap_to_its_dual(device):
     """No image has a lower objective than the dual of PDHG says."""
     A, matrix, _, y = problem(device, noise=0.1)

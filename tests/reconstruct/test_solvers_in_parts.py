@@ -47,6 +47,7 @@ def data() -> np.ndarray:
     return np.abs(normal(len(SCAN.angles), SCAN.bins))
 
 
+@pytest.mark.full
 @every_method
 def test_a_slice_that_a_solver_does_not_hold_is_taken_in_parts(device, method):
     A, whole = projectors(limited(device, MEMORY), device)
@@ -64,6 +65,7 @@ def test_a_slice_that_a_solver_does_not_hold_is_taken_in_parts(device, method):
     assert_same([again.image, found.image], [device.get(wanted.image)] * 2)
 
 
+@pytest.mark.full
 @pytest.mark.parametrize(
     "solve",
     [rift.cgls, lambda A, y, steps, **out: rift.tv(A, y, 0.1, steps, **out)],

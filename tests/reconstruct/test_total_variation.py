@@ -107,6 +107,7 @@ def test_the_variation_of_a_box_is_jump_times_edge_at_any_spacing(device):
         assert variation.value(device.array(image)) == pytest.approx(3 * 20, rel=1e-6)
 
 
+@pytest.mark.full
 def test_the_adjoint_of_the_gradient_is_the_slope_of_the_value(device):
     """By finite differences, where no sample's gradient is zero."""
     if not device.traits.fp64:

@@ -87,6 +87,7 @@ def test_fewer_views_than_tell_and_empty_ones():
     assert order_doubt(sinogram(np.zeros(200)), np.zeros(200)) == ""
 
 
+@pytest.mark.full
 def test_fans_are_doubted_too():
     fan = rift.Fan(even(200, 2 * np.pi), BINS, 1.0, 300, 500)
     A = rift.Projector(rift.Grid((64, 64)), fan)
@@ -98,6 +99,7 @@ def test_fans_are_doubted_too():
     assert "another order" in said
 
 
+@pytest.mark.full
 def test_the_command_says_so(tmp_path, capsys):
     angles = even(181)
     views = sinogram(angles)[by_name(181)]

@@ -49,6 +49,7 @@ def problem(device):
     return A, A(box)
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("method", full(METHODS, "cgls"))
 def test_a_volume_four_times_the_memory_is_solved_for(device, problem, method):
     whole, y = problem
@@ -65,6 +66,7 @@ def test_vectors_are_solved_for_in_parts(device, problem):
     assert close(cgls(A, y, 2), cgls(whole, y, 2))
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("method", full(METHODS, "tv", "weighted subsets"))
 def test_where_no_sum_is_cut_parts_have_the_same_bits(device, problem, method):
     """A volume and its projections fit, the arrays of a method do not."""

@@ -108,6 +108,7 @@ def test_line_integrals_are_mended_where_transmissions_are(ideal):
     np.testing.assert_array_equal(found[untouched], integrals[untouched])
 
 
+@pytest.mark.full
 def test_an_absolute_excess_decides_alone(ideal):
     bad = photons(ideal, 10_000)
     bad[30:40, 4, 70] = 2
@@ -139,6 +140,7 @@ def test_rows_may_be_cut_into_slabs_that_overlap(ideal, size):
         )
 
 
+@pytest.mark.full
 def test_a_device_that_holds_few_rows_gives_the_same(device, ideal):
     import dataclasses
 
@@ -205,6 +207,7 @@ def test_what_is_too_small_to_tell_is_left_alone(shape):
     assert count == 0
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("level", [0.7, -0.3])
 def test_a_constant_stays_and_a_single_pixel_goes(level):
     even = np.full((20, 6, 30), level, np.float32)

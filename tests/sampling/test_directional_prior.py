@@ -78,6 +78,7 @@ def test_a_turned_prior_has_the_power_of_the_turned_frequency():
     np.testing.assert_allclose(quarter, prior.power(back, 60.0), atol=1e-12)
 
 
+@pytest.mark.full
 def test_a_plan_says_what_it_loses_if_its_prior_is_wrong_and_a_blend_loses_less():
     sure = plan(flat(along_x()), 12, LEVEL)
     blend = plan(flat(Trusted(along_x(), 0.8, axes=2)), 12, LEVEL)

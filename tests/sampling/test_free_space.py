@@ -85,6 +85,7 @@ def test_further_views_of_an_opaque_target_stand_before_the_wall():
     assert sight.min() > 0.5
 
 
+@pytest.mark.full
 def test_the_distance_from_what_is_shut_has_its_gradient():
     shape = out_of_sight(walled("depth"), ORIGIN, 0.5, 3.0, 5.0)
     places = all_round(4.1)[:40]

@@ -72,6 +72,7 @@ def test_a_body_hides_the_target_where_a_point_of_the_line_of_sight_lies_in_it(s
         assert clearance[0] <= along + 1e-9
 
 
+@pytest.mark.full
 @given(st.integers(0, 10_000))
 @settings(max_examples=25, deadline=None)
 def test_beside_a_body_a_ball_about_the_target_is_seen_whole(seed):

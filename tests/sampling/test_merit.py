@@ -136,6 +136,7 @@ def test_the_worst_direction_asks_for_the_missing_cone(target):
     assert scored("worst", ring, target) > 1.3 * scored("wiener", ring, target)
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("flat", [True, False])
 def test_it_ranks_as_the_exact_error_does(flat):
     samples = 12 if flat else 8

@@ -101,6 +101,7 @@ def test_a_whole_ring_steps_over_a_small_keep_out():
     np.testing.assert_allclose(np.diff(np.unwrap(view_table.table[:, 0])), 2 * math.pi / 9)
 
 
+@pytest.mark.full
 def test_tilted_rings_are_circles_with_axes_of_their_own():
     found = plan(TARGET, 12, PATHS["three rings"])
     axes = []
@@ -150,6 +151,7 @@ def test_a_path_has_derivatives_as_finite_differences_have(name):
         assert slope[index] == pytest.approx(rate, rel=0.02, abs=2e-3 * np.abs(slope).max())
 
 
+@pytest.mark.full
 def test_a_path_goes_round_keep_outs_or_says_that_none_does():
     near = DesignSpace(TARGET, Constraints(), default_types(TARGET)).limits[0, 2, 0]
     ball = KeepOut(Sphere((near, 0, 0), 0.3 * near))
@@ -170,6 +172,7 @@ def test_a_spline_finds_its_way_beside_a_wall_that_cuts_every_full_turn():
         plan(TARGET, 12, replace(limits, path=Ring()))
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("limits", [Constraints(elevation=(0, 1.3)), Constraints(**SECTOR)])
 def test_a_spline_is_as_good_as_the_best_arc(limits):
     target = Target((0, 0, 0), 10.0, snr=1000.0, frequencies=half_ball(1.6, 600))

@@ -37,6 +37,7 @@ def keeps(found):
     return True
 
 
+@pytest.mark.full
 def test_a_plan_in_a_sector_beats_rings_arcs_and_even_views():
     found = plan(TARGET, 12, Constraints(**SECTOR))
     greedy = plan(TARGET, 12, Constraints(**SECTOR), method="greedy")
@@ -112,6 +113,7 @@ def test_the_same_seed_gives_the_same_plan_and_another_turns_it():
     assert other.merit == pytest.approx(first.merit, rel=0.1)
 
 
+@pytest.mark.full
 @pytest.mark.parametrize(
     "keepout",
     [
@@ -132,6 +134,7 @@ def test_no_camera_stands_in_a_keep_out_or_looks_through_a_body(keepout):
     assert found.merit > free.merit * 0.97
 
 
+@pytest.mark.full
 def test_lenses_are_set_within_their_ranges_and_to_advantage():
     target = replace(TARGET, frequencies=half_ball(2.0, 300), snr=3000.0)
     fixed = plan(target, 6, Constraints(distance=300.0), (ZOOM,))

@@ -87,6 +87,7 @@ def error(found, right):
     return np.linalg.norm(found - right) / np.linalg.norm(right)
 
 
+@pytest.mark.full
 @pytest.mark.each
 @pytest.mark.parametrize("model", ["pinhole", "ortho"])
 def test_light_and_its_gradients_are_the_twins(device, model):
@@ -239,6 +240,7 @@ def test_no_splats_reflect_nothing(device):
     assert not seen_grad(device, values, np.zeros((0, 3), np.float32))["environment"].any()
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("angular", ["sh", "sg"])
 def test_an_image_is_own_colour_plus_light_and_its_gradients_are_differences(device, angular):
     """What is negative on its own is not, once light is added; the sum is what is held above 0."""

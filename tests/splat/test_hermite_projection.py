@@ -70,6 +70,7 @@ def test_extents_are_those_of_the_bound(device, shape, activation, strength):
     assert not wanted[found["culled"] == 3].any(), "left out although it could be seen"
 
 
+@pytest.mark.full
 def test_extents_of_other_activations_without_modes_are_exact(device):
     modal = MODALS["no modes, exp"]
     values = modal_splats(modal, 200)
@@ -81,6 +82,7 @@ def test_extents_of_other_activations_without_modes_are_exact(device):
     assert (found["culled"][seen.weights < 1 / 255.1] > 0).all()
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("shape, color, radius", [(1, 0, 4.353), (0, 2, 4.619), (8, 1, 5.491)])
 def test_line_integrals_reach_as_far_as_their_order_says(device, shape, color, radius):
     modal = Modal(shape, color, settings=SplatSettings(mode="xray"))
@@ -121,6 +123,7 @@ def test_no_order_is_amplified(device):
         assert (np.linalg.norm(on_screen[:, slice(*after)], axis=1) <= long * (1 + 1e-5)).all()
 
 
+@pytest.mark.full
 def test_needles_keep_their_digits(device):
     """The second row of A is a difference of nearly equal numbers, if it is written so."""
     modal = Modal(2, settings=SplatSettings(eps2d=0.01))

@@ -154,6 +154,7 @@ def test_gradient_by_the_camera_is_differences(device, name):
     assert abs((found["camera"] * way).sum() - right) < 1e-3 * scale
 
 
+@pytest.mark.full
 def test_gradient_by_the_aperture_is_differences(device):
     modal = MODALS["lens"]
     values = modal_splats(modal)

@@ -65,6 +65,7 @@ def test_the_highest_order_equals_its_twin(device, kind):
     assert_like_the_twin(device, given, KINDS[kind], 3)
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("channels", [1, 32])
 def test_any_number_of_channels_equals_its_twin(device, channels):
     given = hermite_scene(40, SIZE, (1, 1), channels=channels, colored=channels)

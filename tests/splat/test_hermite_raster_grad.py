@@ -49,6 +49,7 @@ def assert_like_the_twin(device, given, settings, channels):
     assert told.any() and (error[told] < 1e-4 * size[told]).all()
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("kind", KINDS)
 def test_every_way_to_draw_has_the_moments_of_its_twin(device, kind):
     settings = KINDS[kind]
@@ -125,6 +126,7 @@ def differences(loss, splats, name):
     return result
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("kind", ["clamp", "xray"])
 def test_order_zero_has_the_moments_of_the_gaussian(device, kind):
     scene, settings = random_scene(150, SIZE), KINDS[kind]

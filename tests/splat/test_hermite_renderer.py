@@ -97,6 +97,7 @@ def test_modes_of_a_ball_may_be_written_in_any_frame(device):
     same_but_for_thresholds(image(device, moved), image(device, values))
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("eps2d", [0.0, 1.5])
 def test_line_integrals_are_those_of_quadrature(device, eps2d):
     """Through the density in space; dilation is a convolution of the picture with a Gaussian."""

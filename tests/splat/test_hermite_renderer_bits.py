@@ -47,6 +47,7 @@ def needs(device, frame, *, gradient):
     return memory.fixed + whole, memory.fixed + memory.lists(int(rows.max()), tiles.across)
 
 
+@pytest.mark.full
 def test_another_run_gives_the_same_bits(device):
     assert digest(*many(device)) == digest(*many(device))
 
@@ -67,6 +68,7 @@ def test_bands_within_a_small_budget_give_the_same_bits(device, monkeypatch):
     assert device.get(cut.image).tobytes() == right.tobytes()
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("shape, color", [(2, 1), (0, 0), (4, 0)])
 def test_the_estimate_covers_what_is_allocated(device, monkeypatch, shape, color):
     values = few(600, shape=shape, color=color)

@@ -46,6 +46,7 @@ def test_a_splat_whose_modes_outshine_it_is_drawn(device):
     assert image(device, values).max() == 0
 
 
+@pytest.mark.full
 def test_without_splats_there_is_the_background(device):
     values = {name: value[:0] for name, value in few(2).items()}
     renderer, frame = drawn(device, values)
@@ -84,6 +85,7 @@ def test_modes_that_do_not_fit_are_refused(device, changes, kind, words):
         upload(device, **changes)
 
 
+@pytest.mark.full
 def test_what_is_not_there_is_refused(device):
     with pytest.raises(InputError, match="absgrad"):
         drawn(device, few(5), absgrad=True)

@@ -50,6 +50,7 @@ def check_gradients(device, kind, count):
         assert not found["lens"].any()
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("kind, count", [("sg", 4), ("lg", 9)])
 def test_gradients_of_parallel_rays_are_the_twins(device, kind, count):
     """They flow to the camera's axis, and to no mean."""

@@ -71,6 +71,7 @@ def test_an_image_of_splats_with_modes_has_the_same_bits(device, monkeypatch):
     assert_same(found, drawn(device, values))
 
 
+@pytest.mark.full
 def test_an_image_larger_than_the_budget_has_the_same_bits(device, monkeypatch):
     values, rows = visible_splats(150), bands_of(monkeypatch)
     splats, channels = Splats.upload(device, **values), 3

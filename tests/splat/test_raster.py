@@ -43,6 +43,7 @@ def draw(device, scene, settings, background=None):
     return splats, lists, result
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("kind", ["light", "smooth", "low cap"])
 @pytest.mark.parametrize("channels", [1, 4, 9])
 def test_the_median_is_the_feature_of_the_splat_that_leaves_half(device, kind, channels):

@@ -80,6 +80,7 @@ def test_a_driver_that_runs_them_in_smaller_groups(device, monkeypatch):
     assert set(groups_of(small).values()) == {64}
 
 
+@pytest.mark.full
 @pytest.mark.once
 def test_an_image_of_one_pixel(device):
     gpu = as_gpu(device, optimized=False)

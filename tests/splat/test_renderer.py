@@ -108,6 +108,7 @@ def relative(found, expected):
     return np.linalg.norm(found - expected) / np.linalg.norm(expected)
 
 
+@pytest.mark.full
 def test_background_gradient_is_what_is_seen_of_it(device):
     renderer, frame = draw(device, "light", random_splats(60, coefficients=4))
     grad_image = np.random.default_rng(3).normal(size=(*SIZE, 3)).astype(np.float32)

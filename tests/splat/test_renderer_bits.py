@@ -127,6 +127,7 @@ def plans_of(monkeypatch):
     return plans
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("share", [0.0, 0.6])
 def test_bands_within_any_budget_give_the_same_bits(device, monkeypatch, share):
     renderer, frame = drawn(device)
@@ -140,6 +141,7 @@ def test_bands_within_any_budget_give_the_same_bits(device, monkeypatch, share):
     assert 1 < len(forward) < len(backward)
 
 
+@pytest.mark.full
 def test_lists_are_cut_again_where_records_do_not_fit(device, monkeypatch):
     renderer, frame = drawn(device)
     whole, plans = digest(renderer, frame), plans_of(monkeypatch)
@@ -150,6 +152,7 @@ def test_lists_are_cut_again_where_records_do_not_fit(device, monkeypatch):
     assert len(plans) == 1 and len(plans[0]) > 1
 
 
+@pytest.mark.full
 def test_one_band_at_a_time_has_lists_and_records(device, monkeypatch):
     least = needs(device, drawn(device)[1], gradient=True)[1]
     made, most = [], []
@@ -171,6 +174,7 @@ def test_one_band_at_a_time_has_lists_and_records(device, monkeypatch):
     assert len(most) > 4 and max(most) == 1
 
 
+@pytest.mark.full
 def test_records_of_what_is_seen_alone_give_the_same_bits(device, monkeypatch):
     """Again, too: the second gradient lists and packs anew."""
     renderer, frame = drawn(device)

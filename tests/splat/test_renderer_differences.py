@@ -111,6 +111,7 @@ def test_gradients_are_differences(device, way):
         assert abs((gradient.ravel() * way.ravel()).sum() - slope) < 1e-3 * scale, name
 
 
+@pytest.mark.full
 def test_absgrad_is_the_sum_of_every_pixels_magnitude(device):
     """A pixel's gradient hangs on that pixel alone, so each can be asked for by itself."""
     size = (9, 7)

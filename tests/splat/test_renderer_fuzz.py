@@ -214,6 +214,7 @@ def test_where_nothing_is_drawn_there_is_the_background(device, name, places):
     assert all(len(by) == len(places) and not by.any() for by in gradients.values())
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("size, at", [((1, 1), (0, 0)), ((1, 20011), (0, 20003))])
 def test_images_of_one_pixel_or_one_row(device, size, at):
     camera = rift.Camera(size, [[30, 0, at[1] + 0.5], [0, 30, 0.5], [0, 0, 1]], np.eye(4))

@@ -150,6 +150,7 @@ def test_gradient_of_expected_depth_is_the_quotients(device):
         assert error < 1e-5, name
 
 
+@pytest.mark.full
 def test_depth_gradient_is_that_of_differences(device):
     """Through the smooth cut-off, along the camera's axis, in float32 and so to some digits."""
     renderer = Renderer(SplatSettings(smooth_cutoff=True), device=device)

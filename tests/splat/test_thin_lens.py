@@ -172,6 +172,7 @@ def test_gradients_at_the_limits_are_finite(device, aperture):
     assert np.isfinite(device.get(found.splats.means)).all()
 
 
+@pytest.mark.full
 def test_the_apertures_gradient_is_there_where_it_is_asked_for(device):
     for aperture, asked in ((LENS, True), (LENS, False), (None, True)):
         renderer, frame = drawn(device, aperture)

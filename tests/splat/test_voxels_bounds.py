@@ -23,6 +23,7 @@ def test_the_same_call_gives_the_same_bits(device):
     assert runs[0].any() and all(np.array_equal(runs[0], run) for run in runs)
 
 
+@pytest.mark.full
 def test_a_small_budget_gives_the_same_bits_in_more_bands(device, monkeypatch):
     values, bands = random_splats(600, order=1, scales=(0.03, 0.12)), []
     whole = drawn(device, values, GRID)

@@ -27,6 +27,7 @@ def additive_of(device, order, rows=SIZE):
     return Additive(*given, modes=count_of(order)), parameters
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("order", [0, 1, 2])
 def test_pictures_are_those_of_densities_with_modes(device, order):
     additive, parameters = additive_of(device, order)

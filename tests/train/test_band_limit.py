@@ -114,6 +114,7 @@ def test_an_orthographic_camera_resolves_the_same_at_every_depth(device):
     np.testing.assert_allclose(found, np.sqrt(0.2) / 50, rtol=1e-6)
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("lens", [None, (0.05, 3.0, 0.0), (0.2, np.inf, 1e-3)])
 def test_limits_by_coverage_are_the_twins(device, lens):
     cameras, raw = ring(7), raw_values(61)

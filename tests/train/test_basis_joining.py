@@ -75,6 +75,7 @@ def test_a_fit_goes_on_from_any_state_to_the_same_bits(device, kind):
     assert all(np.isfinite(array).all() for array in whole.parameters.host()[0].values())
 
 
+@pytest.mark.full
 def test_orders_join_at_their_steps(device):
     trainer = trainer_of(device, "shape")
     assert "shape_modes" not in trainer.parameters.raw
@@ -103,6 +104,7 @@ def test_what_joins_changes_no_picture(device):
     assert (away > 1e-5).sum() <= 3 and away.max() < 2 / 255
 
 
+@pytest.mark.full
 def test_lobes_join_with_their_own_geometry(device):
     trainer = trainer_of(device, "lg")
     run_to(trainer, 5)

@@ -125,6 +125,7 @@ def test_few_splats_have_normals_as_well(count):
     np.testing.assert_allclose(np.linalg.norm(normals, axis=1), np.ones(count))
 
 
+@pytest.mark.full
 def test_a_light_that_nothing_reflects_is_no_harm(device):
     """A ball without a gloss is fitted as well as without a light."""
     losses = []

@@ -106,6 +106,7 @@ def test_equal_images_have_no_loss_and_no_gradient(device):
     assert not gradient.any()
 
 
+@pytest.mark.full
 @pytest.mark.parametrize(("a", "b"), [(0, 1), (1, 1), (0.3, 0.31), (0.9, 0.2)])
 def test_constant_images_differ_in_luminance_alone(device, a, b):
     """To fewer digits: a variance of nothing is the rounding error of a square, over C2."""

@@ -61,6 +61,7 @@ def drawn_alone(device, parameters):
     return np.array(shares)
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("weighted", [False, True])
 def test_contributions_are_sums_over_pixels_of_each_splats_share(device, weighted):
     parameters, random = parameters_of(device), np.random.default_rng(0)
@@ -240,6 +241,7 @@ def test_what_counts_as_unneeded_falls_until_the_last_relocation(device):
     assert found == pytest.approx([0.4, 0.25, 0.1, 0.1])
 
 
+@pytest.mark.full
 def test_what_was_seen_is_kept_and_checked(device):
     parameters = parameters_of(device)
     strategy = ResidualSettings().begin(parameters, RUN)
@@ -272,6 +274,7 @@ def test_splats_with_modes_contribute_by_the_same_sums(device):
     np.testing.assert_allclose(*tables, rtol=1e-3, atol=1e-3)
 
 
+@pytest.mark.full
 def test_grey_images_and_densities_are_refused(device):
     parameters = parameters_of(device)
     frame = frame_of(device, parameters)

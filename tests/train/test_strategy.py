@@ -86,6 +86,7 @@ def run(ball, parameters, strategy, steps):
     return parameters, sizes
 
 
+@pytest.mark.full
 @pytest.mark.parametrize(
     "settings",
     [RESIDUAL, MCMC, DEFAULT, ABSGRAD],
