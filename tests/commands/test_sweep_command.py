@@ -133,7 +133,6 @@ def test_a_sweep_goes_on_and_each_run_is_what_the_command_makes(scans, tmp_path)
     assert figures["method=cgls_size=8"]["mean"] == float(rows[1]["mean"])
 
 
-@pytest.mark.full
 @pytest.mark.once
 def test_a_run_that_cannot_be_done_is_told_beside_the_others(scans, tmp_path, capsys):
     words = ("--fixed", "kind=attenuation", "center=7.5", "--vary", "rows=0 1,0 9")
