@@ -15,15 +15,23 @@ from rift_cl.commands.fit.checkpoints import CheckpointSchedule
 from rift_cl.commands.interrupts import gentle_interrupt
 from rift_cl.commands.runner import exit_status
 
+HEEDED = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+
 
 @pytest.fixture(autouse=True)
 def handlers():
-    """The handlers are those of before, whatever was heard; a background job ignores Ctrl-C."""
-    usual = signal.signal(signal.SIGINT, signal.default_int_handler)
-    before = [signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)]
+    """The handlers are those of before, whatever was heard.
+
+    As of a program in a terminal: a background job ignores Ctrl-C, and one of nohup's SIGHUP.
+    """
+    usual = {number: signal.getsignal(number) for number in HEEDED}
+    signal.signal(signal.SIGINT, signal.default_int_handler)
+    signal.signal(signal.SIGHUP, signal.SIG_DFL)
+    before = [signal.getsignal(number) for number in HEEDED]
     yield
-    after = [signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)]
-    signal.signal(signal.SIGINT, usual)
+    after = [signal.getsignal(number) for number in HEEDED]
+    for number, handler in usual.items():
+        signal.signal(number, handler)
     assert after == before
 
 

@@ -139,7 +139,7 @@ def _model_binary(folder: Path) -> None:
 
 def _slabs(folder: Path) -> None:
     kept = SlabFolder(folder, SLABS)
-    kept.begin({"scan": "a", "axis": "2.5", "tilt of the axis": "0"}, {"error": 0.1})
+    kept.begin({"rows": "a", "axis": "2.5", "tilt of the axis": "0"}, {"error": 0.1})
     for first in (0, 2):
         kept.path.joinpath(f"{first:05d}-{first + 2:05d}.npy").write_bytes(b"")
         np.save(kept.path / f"{first:05d}-{first + 2:05d}.npy", np.zeros((2, 5, 6), np.float32))
