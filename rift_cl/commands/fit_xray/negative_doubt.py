@@ -48,10 +48,10 @@ def negative_note(missed: float | None, density: float, unit: str) -> list[str]:
     if missed is None:
         return []
     return [
-        f"The projections hold densities below zero, down to {missed * density:.2g} per {unit}, "
-        "which splats cannot be: the fit has about 0 there. 'rift reconstruct' shows them; a "
-        "medium denser than parts of the object, phase contrast, a hardened beam, wrong flats or a "
-        "wrong axis make them."
+        f"The projections ask for densities below zero, down to {missed * density:.2g} per {unit}, "
+        "which splats cannot have: the fit is about 0 there. 'rift reconstruct' shows them. Causes "
+        "are a medium denser than parts of the object, phase contrast, beam hardening, wrong "
+        "flats or a wrong rotation axis."
     ]
 
 

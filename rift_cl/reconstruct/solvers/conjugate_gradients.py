@@ -142,8 +142,8 @@ class Cgls(Solver):
         rounding = _ROUNDING * unit * norm(device, seen) * norm(device, weighted)
         if curvature < -rounding and now.slope**2 > unit * abs(now.loss * curvature):
             raise InputError(
-                "precondition is not positive definite: an image has a negative square in its "
-                "measure, so that there is no least one; wanted a self-adjoint positive operator"
+                "precondition is not positive definite, so that the weighted residual has no "
+                "minimum: wanted a self-adjoint positive definite operator"
             )
 
     def _turn(self) -> None:

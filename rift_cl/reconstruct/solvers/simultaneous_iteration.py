@@ -162,7 +162,7 @@ def check_converges(now: SolverState, most: float, cause: str) -> None:
     """
     if now.rms > most:
         raise InputError(
-            f"SIRT diverges, its residual is {now.rms:.2g} after step {now.step}: " + _CAUSES[cause]
+            f"SIRT diverges (residual {now.rms:.2g} after step {now.step}): {_CAUSES[cause]}"
         )
 
 
